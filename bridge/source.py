@@ -1,0 +1,26 @@
+"""What the host loop reads: a link joined to its decoder and encoder."""
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Protocol
+
+from bridge.measurement import Measurement
+
+
+class Source(Protocol):
+    """Measurements in, estimates out, whatever the medium."""
+
+    counts: Counter[str]
+    """Everything seen and everything refused, by cause: "ATTITUDE", "refused.crc", "refused.repeat", ..."""
+
+    def read(self, timeout_s: float) -> list[Measurement]:
+        """Measurements that came within `timeout_s`; also keeps the link alive (heartbeat, rate requests).
+
+        Raises LinkClosed at the end of a log or when the device is gone.
+        """
+
+    def publish(self, t_us: int, values: Mapping[str, float]) -> None:
+        """Sends named values (at most 10 characters each) to whoever listens on this link."""
+
+    def close(self) -> None:
+        """Releases the link; may be called twice."""

@@ -1,0 +1,1 @@
+"""Vehicle configuration, alignment, live loop, bench identification and reports."""

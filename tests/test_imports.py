@@ -1,0 +1,46 @@
+"""The import map of ARCHITECTURE.md, held by reading the code."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+OURS = {"firmware_model", "bridge", "host", "tools"}
+MAY_IMPORT = {
+    "firmware_model": set(),
+    "bridge": set(),
+    "host": {"firmware_model", "bridge"},
+    "tools/sitl": set(),
+    "tools/commands": OURS,
+}
+
+
+def imported_roots(path: Path) -> set[str]:
+    roots = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            roots |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            roots.add((node.module or "").split(".")[0])
+    return roots & OURS
+
+
+@pytest.mark.parametrize("folder", sorted(MAY_IMPORT))
+def test_package_imports_only_what_the_map_allows(folder: str) -> None:
+    files = sorted((ROOT / folder).rglob("*.py"))
+    assert files
+    own = {folder} if "/" not in folder else set()
+    for path in files:
+        foreign = imported_roots(path) - own - MAY_IMPORT[folder]
+        if folder == "tools/sitl":
+            # The plant may import its own folder, and nothing else of ours: else the simulator would confirm our errors.
+            foreign = {
+                node.module
+                for node in ast.walk(ast.parse(path.read_text()))
+                if isinstance(node, ast.ImportFrom)
+                and (node.module or "").split(".")[0] in OURS
+                and not (node.module or "").startswith("tools.sitl")
+            }
+        assert not foreign, f"{path} imports {foreign}"

@@ -1,0 +1,1 @@
+"""The `mils` command, the simulated vehicle, benchmarks and the paper's reproduction."""
