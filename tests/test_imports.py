@@ -35,7 +35,7 @@ def test_package_imports_only_what_the_map_allows(folder: str) -> None:
     for path in files:
         foreign = imported_roots(path) - own - MAY_IMPORT[folder]
         if folder == "tools/sitl":
-            # The plant may import its own folder, and nothing else of ours: else the simulator would confirm our errors.
+            # The plant imports its own folder and nothing else of ours: it must not confirm our errors.
             foreign = {
                 node.module
                 for node in ast.walk(ast.parse(path.read_text()))
