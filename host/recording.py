@@ -1,0 +1,111 @@
+"""A recording on its time grid: what identification, prediction and diagnosis work on."""
+
+import hashlib
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recording:
+    """One uninterrupted stretch of a recording. All arrays have shape (N,); NaN means "not measured".
+
+    time        s, strictly increasing, from the start of the file
+    depth       m, positive down
+    pitch       rad, positive nose up
+    rudder      rad, stern plane, held constant until the next row; never NaN
+    speed       m/s through the water; all NaN where the vehicle has no speed sensor
+    pitch_rate  rad/s; all NaN where it is not recorded
+    step        s, nominal interval
+    """
+
+    name: str
+    sha256: str
+    time: Array
+    depth: Array
+    pitch: Array
+    rudder: Array
+    speed: Array
+    pitch_rate: Array
+    step: float
+    counts: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def has_speed(self) -> bool:
+        return bool(np.isfinite(self.speed).all())
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first to the last row."""
+        return float(self.time[-1] - self.time[0])
+
+    @property
+    def intervals(self) -> Array:
+        """Time from each row to the next, s, shape (N,); the last one is the nominal step."""
+        return np.diff(self.time, append=self.time[-1] + self.step)
+
+    def between(self, start: float, end: float) -> "Recording":
+        """Rows with start <= time < end."""
+        rows = (self.time >= start) & (self.time < end)
+        return replace(
+            self,
+            time=self.time[rows],
+            depth=self.depth[rows],
+            pitch=self.pitch[rows],
+            rudder=self.rudder[rows],
+            speed=self.speed[rows],
+            pitch_rate=self.pitch_rate[rows],
+        )
+
+
+def split_at_gaps(recording: Recording, longest_hold: float) -> list[Recording]:
+    """Cuts where rows are further apart than `longest_hold` s, or where the rudder is unknown for that long.
+
+    A shorter loss of the rudder is bridged by holding its last value, as the actuator does. Stretches
+    that hold fewer than ten rows, or no depth or no pitch at all, are dropped.
+    """
+    known = np.isfinite(recording.rudder)
+    rows = np.arange(recording.time.size)
+    last_known = np.maximum.accumulate(np.where(known, rows, -1))
+    reachable = last_known >= 0
+    held = recording.time - recording.time[np.maximum(last_known, 0)]
+    usable = reachable & (held <= longest_hold)
+    rudder = np.where(usable, recording.rudder[np.maximum(last_known, 0)], np.nan)
+    filled = replace(recording, rudder=rudder)
+    starts_anew = np.diff(recording.time, prepend=recording.time[0]) > longest_hold
+    starts_anew |= usable & ~np.concatenate([[False], usable[:-1]])
+    group = np.cumsum(starts_anew)
+    pieces = []
+    for label in np.unique(group[usable]):
+        of_piece = usable & (group == label)
+        piece = replace(
+            filled,
+            **{
+                name: getattr(filled, name)[of_piece]
+                for name in ("time", "depth", "pitch", "rudder", "speed", "pitch_rate")
+            },
+        )
+        if of_piece.sum() >= 10 and np.isfinite(piece.depth).any() and np.isfinite(piece.pitch).any():
+            pieces.append(_with_whole_speed(piece))
+    return pieces
+
+
+def _with_whole_speed(piece: Recording) -> Recording:
+    """Speed varies slowly: short losses are bridged linearly, a speed missing half the time is no speed."""
+    known = np.isfinite(piece.speed)
+    if known.mean() < 0.5:
+        return replace(piece, speed=np.full_like(piece.speed, np.nan))
+    if known.all():
+        return piece
+    return replace(piece, speed=np.interp(piece.time, piece.time[known], piece.speed[known]))
+
+
+def file_sha256(path: Path) -> str:
+    """Fingerprint of a recording for the provenance of what is learnt from it."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

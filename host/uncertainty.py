@@ -1,0 +1,88 @@
+"""What the data really say of the parameters: covariance for coloured residuals, and what cannot be told."""
+
+import numpy as np
+
+from host.equations import NAMES
+from host.maximum_likelihood import Fit
+from host.recording import Array
+from host.whiteness import autocovariance, is_white
+
+LONGEST_CORRELATION = 0.1  # of a recording's rows: beyond it autocovariances are mostly noise
+
+
+def covariance(fit: Fit) -> Array:
+    """Covariance (8, 8) of the parameters; zero for held ones.
+
+    White innovations: the inverse Fisher information M^-1. Coloured ones: M^-1 B M^-1 with
+    B = sum_k sum_l s_k R(k - l) s_l^T from the innovations' own autocovariance R (Grauer and Morelli,
+    J. Aircraft 52(3), 2015), without which deviations come out several times too small.
+    """
+    free = fit.free
+    M = fit.information[np.ix_(free, free)]
+    inverse = _safe_inverse(M)
+    if not all(is_white(e) for e in fit.whitened):
+        inverse = inverse @ _coloured_information(fit) @ inverse
+    full = np.zeros((free.size, free.size))
+    full[np.ix_(free, free)] = inverse
+    return full
+
+
+def _safe_inverse(M: Array) -> Array:
+    """Inverse by scaled eigenvectors; directions without information get a huge but finite variance."""
+    scale = np.sqrt(np.maximum(np.diag(M), 1e-300))
+    values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
+    values = np.maximum(values, 1e-14)
+    return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))
+
+
+def _coloured_information(fit: Fit) -> Array:
+    count = int(fit.free.sum())
+    B = np.zeros((count, count))
+    for white, scores in zip(fit.whitened, fit.scores, strict=True):
+        lags = max(1, int(LONGEST_CORRELATION * white.shape[1]))
+        for e, S in zip(white, scores, strict=True):
+            if np.isfinite(e).sum() < 2:
+                continue
+            R, _ = autocovariance(e, lags)
+            # Parzen's window keeps the sum positive definite.
+            x = np.arange(lags + 1) / lags
+            window = np.where(x <= 0.5, 1.0 - 6.0 * x**2 * (1.0 - x), 2.0 * (1.0 - x) ** 3)
+            kernel = np.concatenate(
+                [R * window, np.zeros(2 * S.shape[1] - 2 * lags - 1), (R * window)[:0:-1]]
+            )
+            spectrum = np.maximum(np.fft.rfft(kernel).real, 0.0)
+            transform = np.fft.rfft(S, kernel.size, axis=1)
+            smoothed = np.fft.irfft(transform * spectrum, kernel.size, axis=1)[:, : S.shape[1]]
+            B += smoothed @ S.T
+    return 0.5 * (B + B.T)
+
+
+def undetermined(parameters: Array, covariance: Array, free: Array) -> list[str]:
+    """Names of the parameters that the recording leaves open: a 95 % interval as wide as the value itself.
+
+    The plane's heave force and the heave damping count against the depth that pitching gives, for on most
+    vehicles they are small: b1 is known when its share of the steady climb is known to a quarter.
+    """
+    values = dict(zip(NAMES, parameters, strict=True))
+    std = dict(zip(NAMES, np.sqrt(np.diag(covariance)), strict=True))
+    names = [
+        name
+        for name in ("a1", "a2", "a3", "b2", "u0")
+        if free[NAMES.index(name)] and std[name] > 0.5 * abs(values[name])
+    ]
+    climb_by_pitch = abs(values["u0"] * values["b2"] / values["a3"]) if values["a3"] else np.inf
+    if free[NAMES.index("b1")] and std["b1"] / abs(values["a1"]) > 0.25 * climb_by_pitch:
+        names.append("b1")
+    return names
+
+
+HEAVE_STEPS = "plane steps of 1 to 8 s with the depth hold off, so that the plane's own force moves heave"
+MANOEUVRE = {
+    "a1": HEAVE_STEPS,
+    "b1": HEAVE_STEPS,
+    "a2": "quick plane reversals (3-2-1-1) that make the pitch overshoot",
+    "a3": "plane steps held until the pitch settles, at several angles",
+    "b2": "plane steps large against the pitch noise",
+    "u0": "held pitch of both signs for ten seconds or more, or record the speed",
+}
+"""The manoeuvre that shows each parameter."""

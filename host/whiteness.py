@@ -1,0 +1,29 @@
+"""Whiteness of innovations: what remains after a model that leaves nothing out is white."""
+
+import numpy as np
+from scipy.stats import chi2
+
+from host.recording import Array
+
+
+def autocovariance(values: Array, lags: int) -> tuple[Array, Array]:
+    """Autocovariance of (N,) values at lags 0..lags over the pairs in which neither is NaN, and the pairs."""
+    present = np.isfinite(values)
+    centred = np.where(present, values - values[present].mean(), 0.0)
+    transform = 2 * values.size
+    pairs = np.fft.irfft(np.abs(np.fft.rfft(present.astype(float), transform)) ** 2, transform)[: lags + 1]
+    sums = np.fft.irfft(np.abs(np.fft.rfft(centred, transform)) ** 2, transform)[: lags + 1]
+    pairs = np.rint(pairs)
+    return sums / np.maximum(pairs, 1.0), pairs
+
+
+def is_white(innovations: Array, lags: int = 20, significance: float = 0.001) -> bool:
+    """Box-Pierce test on each row of (outputs, N) innovations, each lag weighted by its number of pairs."""
+    for values in innovations:
+        if np.isfinite(values).sum() < 3 * lags:
+            continue
+        covariance, pairs = autocovariance(values, lags)
+        statistic = np.sum(pairs[1:] * (covariance[1:] / covariance[0]) ** 2)
+        if statistic > chi2.ppf(1.0 - significance, lags):
+            return False
+    return True
