@@ -2,6 +2,7 @@
 
 import dataclasses
 import difflib
+import functools
 import json
 import math
 import tomllib
@@ -15,7 +16,18 @@ from host.errors import ConfigError
 
 T = TypeVar("T")
 
+_SHARED = "shared"
+
+_Fields = Mapping[str, "dataclasses.Field[Any]"]
 _NAMES = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", Path: "a path"}
+
+
+def shared(**sources: str) -> dict[str, dict[str, str]]:
+    """Metadata of a field that holds a dataclass: these keys of it are given by others of the same file.
+
+    `field(metadata=shared(step="alignment.step"))` takes `step` from the dotted key beside the field.
+    """
+    return {_SHARED: sources}
 
 
 def read_toml(path: Path, kind: type[T]) -> T:
@@ -43,8 +55,14 @@ def build(kind: type[T], table: Mapping[str, Any], *, file: str, folder: Path) -
 def to_table(config: object) -> dict[str, Any]:
     """The configuration with its defaults filled in, as `build` takes it; what is None is left out."""
     assert dataclasses.is_dataclass(config)
-    values = ((field.name, getattr(config, field.name)) for field in dataclasses.fields(config))
-    return {name: _plain(value) for name, value in values if value is not None}
+    table = {}
+    for field in dataclasses.fields(config):
+        value = getattr(config, field.name)
+        if value is not None:
+            table[field.name] = _plain(value)
+        for key in field.metadata.get(_SHARED, ()):
+            del table[field.name][key]
+    return table
 
 
 def to_toml(config: object) -> str:
@@ -67,17 +85,40 @@ class _Builder:
         for key in table:
             if key not in fields:
                 raise _Broken(_unknown(_join(where, key), key, list(fields)))
-        for name, field in fields.items():
-            required = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
-            if required and name not in table:
-                raise _Broken(f"{_join(where, name)} is missing")
         hints = get_type_hints(kind)
-        values = {key: self.value(hints[key], value, _join(where, key)) for key, value in table.items()}
+        values: dict[str, Any] = {}
+        for name, field in sorted(fields.items(), key=lambda item: _SHARED in item[1].metadata):
+            at = _join(where, name)
+            if _SHARED in field.metadata:
+                sources = field.metadata[_SHARED]
+                given = self.shared(sources, table.get(name, {}), fields, values, at)
+                try:
+                    values[name] = self.value(hints[name], given, at)
+                except _Broken as broken:
+                    raise _Broken(_named_by_source(str(broken), at, where, sources)) from broken.__cause__
+            elif name in table:
+                values[name] = self.value(hints[name], table[name], at)
+            elif _default(field) is dataclasses.MISSING:
+                raise _Broken(f"{at} is missing")
         try:
             return kind(**values)
         except ValueError as error:
             # The message begins with the field's own name.
             raise _Broken(_join(where, str(error))) from error
+
+    def shared(
+        self, sources: Mapping[str, str], table: object, fields: _Fields, built: Mapping[str, Any], where: str
+    ) -> dict[str, Any]:
+        """The table of a field with the keys that others give."""
+        if not isinstance(table, Mapping):
+            raise _wrong_type(where, "a table", table)
+        given = dict(table)
+        for key, source in sources.items():
+            if key in table:
+                raise _Broken(f"{_join(where, key)} is given by {source}; leave it out here")
+            first, *rest = source.split(".")
+            given[key] = functools.reduce(getattr, rest, built.get(first, _default(fields[first])))
+        return given
 
     def value(self, kind: Any, value: object, where: str) -> Any:
         origin, arguments = get_origin(kind), get_args(kind)
@@ -127,6 +168,20 @@ class _Builder:
         if isinstance(value, float) and math.isnan(value):
             raise _Broken(f"{where} must be a number (got nan, or a whole number beyond 2^53)")
         return value
+
+
+def _default(field: "dataclasses.Field[Any]") -> Any:
+    if field.default_factory is not dataclasses.MISSING:
+        return field.default_factory()
+    return field.default
+
+
+def _named_by_source(message: str, at: str, where: str, sources: Mapping[str, str]) -> str:
+    """A rule broken by a shared key is the fault of the key that the user wrote."""
+    for key, source in sources.items():
+        if message.startswith(f"{_join(at, key)} "):
+            return _join(where, source) + message.removeprefix(_join(at, key))
+    return message
 
 
 def _join(where: str, key: str) -> str:

@@ -1,0 +1,115 @@
+"""A source that outlives its link: a cable pulled is waited for, and nothing is joined across the break."""
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from bridge.errors import BridgeError, LinkClosed
+from bridge.measurement import Measurement
+from bridge.source import Source
+
+_FIRST_WAIT = 0.5  # s, doubled with every attempt that fails
+_LONGEST_WAIT = 10.0  # s
+
+
+class LastingSource:
+    """Reads from sources that `open_source` opens, one after the other.
+
+    A link that closes is reported once and opened again, at first after 0.5 s and then ever more seldom, for
+    `reopen_for` s. The boots of a reopened source count on from those before. The counts go on as well, with
+    "link.lost" and "link.reopened" among them.
+
+    clock   monotonic time, s
+    sleep   waits as many s as it is told
+    say     takes each sentence about the link
+    """
+
+    def __init__(
+        self,
+        open_source: Callable[[], Source],
+        *,
+        reopen_for: float,
+        clock: Callable[[], float],
+        sleep: Callable[[float], None],
+        say: Callable[[str], None],
+    ) -> None:
+        """Opens the first source; a LinkError of this first attempt is the caller's."""
+        self._open_source = open_source
+        self._reopen_for = reopen_for
+        self._clock = clock
+        self._sleep = sleep
+        self._say = say
+        self._source: Source | None = open_source()
+        self._earlier: Counter[str] = Counter()
+        self._first_boot = self._last_boot = 0
+        self._lost_at = self._next_attempt = 0.0
+        self._wait = _FIRST_WAIT
+        self._is_over = False
+
+    @property
+    def counts(self) -> Counter[str]:
+        return self._earlier + self._source.counts if self._source else Counter(self._earlier)
+
+    def read(self, timeout_s: float) -> list[Measurement]:
+        """As `Source.read`; [] while the link is gone. Raises LinkClosed once it is given up."""
+        if self._is_over:
+            raise LinkClosed("link is closed")
+        if self._source is None:
+            self._reopen(timeout_s)
+            return []
+        try:
+            measurements = self._source.read(timeout_s)
+        except LinkClosed as closed:
+            self._lose(closed)
+            return []
+        renumbered = [replace(m, boot=self._first_boot + m.boot) for m in measurements]
+        self._last_boot = max([self._last_boot, *(m.boot for m in renumbered)])
+        return renumbered
+
+    def publish(self, t_us: int, values: Mapping[str, float]) -> None:
+        """As `Source.publish`; nothing while the link is gone."""
+        if self._source is not None:
+            try:
+                self._source.publish(t_us, values)
+            except LinkClosed as closed:
+                self._lose(closed)
+
+    def close(self) -> None:
+        """May be called twice."""
+        self._drop()
+        self._is_over = True
+
+    def _drop(self) -> None:
+        if self._source is not None:
+            self._earlier = self.counts
+            self._source.close()
+            self._source = None
+
+    def _lose(self, cause: LinkClosed) -> None:
+        self._drop()
+        if self._reopen_for <= 0:
+            self._is_over = True
+            raise cause
+        self._earlier["link.lost"] += 1
+        self._first_boot = self._last_boot + 1
+        self._lost_at = self._clock()
+        self._wait = _FIRST_WAIT
+        self._next_attempt = self._lost_at + self._wait
+        self._say(f"link lost ({cause}); trying to open it again for {self._reopen_for:g} s")
+
+    def _reopen(self, timeout_s: float) -> None:
+        now = self._clock()
+        if now < self._next_attempt:
+            self._sleep(min(timeout_s, self._next_attempt - now))
+            return
+        try:
+            self._source = self._open_source()
+        except BridgeError as error:
+            if now - self._lost_at >= self._reopen_for:
+                self._is_over = True
+                raise LinkClosed(f"link lost for {self._reopen_for:g} s and given up ({error})") from error
+            self._wait = min(2 * self._wait, _LONGEST_WAIT)
+            self._next_attempt = self._clock() + self._wait
+            return
+        self._earlier["link.reopened"] += 1
+        self._say(f"link opened again after {now - self._lost_at:.1f} s")
