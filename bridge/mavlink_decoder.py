@@ -33,14 +33,16 @@ _NOT_VEHICLES = {dialect.MAV_TYPE_GCS, dialect.MAV_TYPE_ONBOARD_CONTROLLER, dial
 class MavlinkDecoder:
     """`feed(bytes, receive time) -> list[Measurement]` for one vehicle; the rest is counted and ignored.
 
-    counts   each intact frame by message name, whoever sent it; refusals as "refused.<cause>"; "lost" by
-             gaps of the vehicle's sequence numbers; "ack.accepted" and "ack.denied" of rate requests; "note.<what>"
+    counts   each intact frame by message name, whoever sent it; refusals as "refused.<cause>"; "lost" by gaps
+             of the vehicle's sequence numbers; "ack.accepted", "ack.denied" of rate requests; "note.<what>"
+    heard    intact frames of the vehicle by message name
     notes    what was decided on the user's behalf, one sentence each
     vehicle  (system, component) locked onto, or None as long as no autopilot was heard
     """
 
     def __init__(self, mapping: MavlinkMap, counts: Counter[str] | None = None) -> None:
         self.counts: Counter[str] = Counter() if counts is None else counts
+        self.heard: Counter[str] = Counter()
         self.notes: list[str] = []
         self.vehicle: tuple[int, int] | None = None
         if mapping.system_id is not None and mapping.component_id is not None:
@@ -102,6 +104,7 @@ class MavlinkDecoder:
         if not self._is_new(frame):
             self.counts["refused.duplicate"] += 1
             return
+        self.heard[name] += 1
         handler = self._handlers.get(name)
         if handler is not None:
             handler(frame.payload, t_us, out)

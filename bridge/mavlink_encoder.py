@@ -19,6 +19,7 @@ class MavlinkEncoder:
     """Encodes as one sender (system, component), counting its own sequence numbers."""
 
     def __init__(self, mapping: MavlinkMap, *, system: int, component: int) -> None:
+        self.system = system
         self._map = mapping
         self._mav = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
         self._pitch = 0.0

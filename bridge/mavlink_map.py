@@ -55,6 +55,10 @@ class MavlinkMap:
     pitch_sign: int = 1  # -1 for an autopilot mounted backwards
     pitch_rate: bool = True
     rudder: tuple[ServoTerm, ...] = ()
+    csrv_id: int | None = (
+        None  # in .BIN: the servo whose reported angle (CSRV.Pos, rad) is the rudder instead
+    )
+    csrv_sign: int = 1
     speed_source: SpeedSource = "none"
 
     attitude_rate_hz: float = 20.0  # requested from the vehicle; 0 leaves its own rate
@@ -82,8 +86,9 @@ class MavlinkMap:
             raise ValueError(f"surface_pressure_hpa must be in 300..1200 (got {self.surface_pressure_hpa})")
         if not 0.0 <= self.repeat_hold_s <= 60.0:
             raise ValueError(f"repeat_hold_s must be in 0..60 (got {self.repeat_hold_s})")
-        if self.pitch_sign not in (1, -1):
-            raise ValueError(f"pitch_sign must be 1 or -1 (got {self.pitch_sign})")
+        for name in ("pitch_sign", "csrv_sign"):
+            if getattr(self, name) not in (1, -1):
+                raise ValueError(f"{name} must be 1 or -1 (got {getattr(self, name)})")
         channels = [term.channel for term in self.rudder]
         if len(set(channels)) != len(channels):
             raise ValueError(f"rudder must name each channel once (got {channels})")

@@ -1,4 +1,4 @@
-"""Ground-station logs (.tlog): records of an 8-byte big-endian time stamp (us since 1970) and one MAVLink frame."""
+"""Ground-station logs (.tlog): records of an 8-byte big-endian stamp (us since 1970) and a MAVLink frame."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -41,8 +41,9 @@ def read_tlog(path: Path, mapping: MavlinkMap) -> tuple[list[Measurement], Count
 def walk_tlog(data: bytes, counts: Counter[str]) -> Iterator[tuple[int, Frame]]:
     """(receive time, frame) of every intact record, wherever it stands.
 
-    The time is the sum of the plausible steps between stamps (at most an hour either way): an absurd stamp or a
-    computer clock that was set during the dive stands still for one record and is counted.
+    The time is the sum of the plausible steps between stamps (at most an hour either way): at an absurd
+    stamp, or when the computer's clock was set during the dive, it stands still for one record and that is
+    counted.
     """
     scanner = Scanner(counts)
     at = 0

@@ -14,8 +14,8 @@ class VehicleClock:
     """Puts every stamp on the clock of the vehicle's first boot.
 
     A step back, or a leap ahead by more than 10 s, counts only once a second message agrees with it; the
-    first one is refused (None). So a single absurd stamp moves nothing, and a restart costs one message. After
-    a restart `boot` is one higher and the timeline goes on by the receive time that has passed.
+    first one is refused (None). So a single absurd stamp moves nothing, and a restart costs one message.
+    After a restart `boot` is one higher and the timeline goes on by the receive time that has passed.
     """
 
     def __init__(self) -> None:

@@ -20,9 +20,9 @@ def monotonic_us() -> int:
 class UdpLink:
     """Packets from one peer.
 
-    Listening, the first sender is the peer; datagrams of others are counted ("refused.udp_sender") and dropped
-    unless the peer has been silent for 5 s, as after a restart on another port. Nothing is sent before a peer is
-    known. Speaking first, the peer is the given address for ever.
+    Listening, the first sender is the peer; datagrams of others are counted ("refused.udp_sender") and
+    dropped unless the peer has been silent for 5 s, as after a restart on another port. Nothing is sent
+    before a peer is known. Speaking first, the peer is the given address for ever.
     """
 
     def __init__(
