@@ -8,12 +8,12 @@ import numpy as np
 
 from host.csv_map import UNITS, CsvColumn, CsvMap
 from host.errors import RecordingError
-from host.recording import Array, Recording, file_sha256, split_at_gaps
+from host.recording import NEEDED, Array, Recording, file_sha256, split_at_gaps
 
-OPTIONAL = ("speed", "pitch_rate")
+CHANNELS = ("depth", "pitch", "rudder", "speed", "pitch_rate")
 
 
-def read_csv_recording(path: Path, columns: CsvMap) -> list[Recording]:
+def read_csv_recording(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> list[Recording]:
     """Reads a text recording; several stretches when it has gaps.
 
     Rows whose time is missing, repeated or runs backwards are dropped and counted; any other cell that is
@@ -23,14 +23,14 @@ def read_csv_recording(path: Path, columns: CsvMap) -> list[Recording]:
     header, rows = _read_rows(path)
     counts: Counter[str] = Counter(rows=len(rows))
     values: dict[str, Array] = {}
-    for quantity in ("time", "depth", "pitch", "rudder", *OPTIONAL):
+    for quantity in ("time", *CHANNELS):
         column: CsvColumn = getattr(columns, quantity)
         if column.column in header:
             raw = _numbers(rows, header.index(column.column))
             factor = column.sign * UNITS[quantity][column.unit] * column.scale
             values[quantity] = raw * factor + column.offset
             counts[f"missing.{quantity}"] = int(np.isnan(raw).sum())
-        elif quantity in OPTIONAL:
+        elif quantity in CHANNELS and quantity not in needs:
             values[quantity] = np.full(len(rows), np.nan)
         else:
             raise RecordingError(
@@ -56,10 +56,10 @@ def read_csv_recording(path: Path, columns: CsvMap) -> list[Recording]:
         step=step,
         counts=counts,
     )
-    pieces = split_at_gaps(whole, max(1.0, 2.5 * step))
+    pieces = split_at_gaps(whole, max(1.0, 2.5 * step), needs)
     if not pieces:
         raise RecordingError(
-            f"{path}: no stretch of 10 rows has depth, pitch and rudder together ({_summary(counts)})"
+            f"{path}: no stretch of 10 rows has {', '.join(needs)} together ({_summary(counts)})"
         )
     return pieces
 

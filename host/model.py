@@ -21,7 +21,7 @@ class VehicleModel:
     """The equations' coefficients with what is known of their accuracy.
 
     values, std  by parameter name (host.equations), SI units; std 0 where a value was given, not estimated
-    noise        standard deviations "pitch_rad", "depth_m" and, where unknown forces were found, the densities
+    noise        standard deviations "pitch_rad", "depth_m" and, where unknown forces were found, densities
                  "heave_force_density", "pitch_moment_density"
     valid_range  smallest and largest "pitch_rad", "rudder_rad", "depth_m", "speed_mps" the data held
     provenance   recording names with sha256, program version, method
@@ -35,6 +35,11 @@ class VehicleModel:
     valid_range: dict[str, tuple[float, float]]
     provenance: dict[str, Any]
     effects: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """SI unit by parameter name."""
+        return UNITS
 
     @property
     def parameters(self) -> Array:
@@ -54,7 +59,8 @@ def write_model(model: VehicleModel, path: Path) -> None:
         "vehicle": model.vehicle,
         "step_s": model.step,
         "parameters": {
-            name: {"value": model.values[name], "std": model.std[name], "unit": UNITS[name]} for name in NAMES
+            name: {"value": _json(model.values[name]), "std": _json(model.std[name]), "unit": UNITS[name]}
+            for name in NAMES
         },
         "effects": model.effects,
         "noise": model.noise,
@@ -62,6 +68,11 @@ def write_model(model: VehicleModel, path: Path) -> None:
         "provenance": model.provenance,
     }
     path.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _json(value: float) -> float | None:
+    """JSON has no NaN: a value that could not be found is null."""
+    return value if np.isfinite(value) else None
 
 
 def read_model(path: Path) -> VehicleModel:

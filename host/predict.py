@@ -50,7 +50,7 @@ def predict(model: VehicleModel, recording: Recording) -> Prediction:
         opening = recording.between(recording.time[0], recording.time[min(4, recording.time.size - 1)])
     initial = estimate_initial_state(model.parameters, opening, inputs)
     states = free_run(model.parameters, initial, inputs)
-    return Prediction(recording=recording, states=states, score=score(states, recording))
+    return Prediction(recording=recording, states=states, score=score(states, [recording]))
 
 
 def estimate_initial_state(parameters: Array, opening: Recording, whole: Inputs) -> Array:
@@ -66,7 +66,7 @@ def estimate_initial_state(parameters: Array, opening: Recording, whole: Inputs)
         present=whole.present[:, :rows],
         substeps=whole.substeps,
     )
-    seen = inputs.present.any(axis=1)
+    seen = inputs.present.sum(axis=1) > 0.0
     if not seen.all():
         lacking = "pitch" if not seen[0] else "depth"
         raise RecordingError(
@@ -86,10 +86,12 @@ def estimate_initial_state(parameters: Array, opening: Recording, whole: Inputs)
     return x
 
 
-def score(states: Array, recording: Recording) -> Score:
-    """Scores simulated states (4, N) against what was measured."""
-    pitch_rmse, pitch_fit, pitch_samples = _channel(recording.pitch, states[2])
-    depth_rmse, depth_fit, depth_samples = _channel(recording.depth, states[3])
+def score(states: Array, recordings: list[Recording]) -> Score:
+    """Scores simulated states (4, N) against what was measured in the recordings, one after the other."""
+    pitch = np.concatenate([recording.pitch for recording in recordings])
+    depth = np.concatenate([recording.depth for recording in recordings])
+    pitch_rmse, pitch_fit, pitch_samples = _channel(pitch, states[2])
+    depth_rmse, depth_fit, depth_samples = _channel(depth, states[3])
     return Score(
         depth_rmse_m=depth_rmse,
         pitch_rmse_rad=pitch_rmse,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+NEEDED = ("depth", "pitch", "rudder")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,11 +64,13 @@ class Recording:
         )
 
 
-def split_at_gaps(recording: Recording, longest_hold: float) -> list[Recording]:
+def split_at_gaps(
+    recording: Recording, longest_hold: float, needs: tuple[str, ...] = NEEDED
+) -> list[Recording]:
     """Cuts where rows are further apart than `longest_hold` s, or where the rudder is unknown for that long.
 
     A shorter loss of the rudder is bridged by holding its last value, as the actuator does. Stretches
-    that hold fewer than ten rows, or no depth or no pitch at all, are dropped.
+    that hold fewer than ten rows, or nothing at all of a needed channel, are dropped.
     """
     known = np.isfinite(recording.rudder)
     rows = np.arange(recording.time.size)
@@ -90,7 +93,7 @@ def split_at_gaps(recording: Recording, longest_hold: float) -> list[Recording]:
                 for name in ("time", "depth", "pitch", "rudder", "speed", "pitch_rate")
             },
         )
-        if of_piece.sum() >= 10 and np.isfinite(piece.depth).any() and np.isfinite(piece.pitch).any():
+        if of_piece.sum() >= 10 and all(np.isfinite(getattr(piece, name)).any() for name in needs):
             pieces.append(_with_whole_speed(piece))
     return pieces
 

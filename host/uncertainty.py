@@ -3,7 +3,7 @@
 import numpy as np
 
 from host.equations import NAMES
-from host.maximum_likelihood import Fit
+from host.maximum_likelihood import Fit, Mask
 from host.recording import Array
 from host.whiteness import autocovariance, is_white
 
@@ -57,7 +57,7 @@ def _coloured_information(fit: Fit) -> Array:
     return 0.5 * (B + B.T)
 
 
-def undetermined(parameters: Array, covariance: Array, free: Array) -> list[str]:
+def undetermined(parameters: Array, covariance: Array, free: Mask) -> list[str]:
     """Names of the parameters that the recording leaves open: a 95 % interval as wide as the value itself.
 
     The plane's heave force and the heave damping count against the depth that pitching gives, for on most

@@ -1,0 +1,189 @@
+"""Bench identification: recordings of one vehicle to its model, with what is known and what is not."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite
+from typing import Literal
+
+import numpy as np
+
+from host.equations import NAMES
+from host.identify_car import car_least_squares, run_estimator
+from host.maximum_likelihood import LOWER, UPPER, Fit, fit_maximum_likelihood
+from host.model import VehicleModel, program_version
+from host.predict import Prediction, predict
+from host.recording import Array, Recording
+from host.uncertainty import covariance, undetermined
+from host.vehicle import Vehicle
+from host.whiteness import is_white
+
+Method = Literal["car", "mils", "ml"]
+METHODS: tuple[Method, ...] = ("car", "mils", "ml")
+SHORTEST_TO_SPLIT = 40.0  # s; below it a held-out part would leave too little to learn from
+HELD_OUT_SHARE = 0.3
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identification:
+    """What was learnt.
+
+    predictions   free run of the model on every recording it learnt from
+    held_out      free run, over the last 30 %, of a second model that learnt from the first 70 % only;
+                  None where the recordings are too short to be divided
+    undetermined  names of parameters that the recordings leave open
+    notes         sentences a person should read
+    history       estimates after each sample, name -> (N,), for recursive methods
+    """
+
+    method: Method
+    model: VehicleModel
+    recordings: list[Recording]
+    predictions: list[Prediction]
+    held_out: list[Prediction] | None
+    undetermined: list[str]
+    notes: list[str]
+    fit: Fit | None
+    history: dict[str, Array] | None
+
+
+def identify(
+    recordings: list[Recording],
+    vehicle: Vehicle,
+    method: Method = "ml",
+    on_progress: Progress = lambda _: None,
+) -> Identification:
+    """Identifies one vehicle from its recordings, jointly, by the named method (default: most accurate)."""
+    model, fit, history = _learn(recordings, vehicle, method, on_progress)
+    held_out = None
+    if sum(recording.duration for recording in recordings) >= SHORTEST_TO_SPLIT:
+        on_progress("held-out check")
+        held_out = _held_out(recordings, vehicle, method)
+    return Identification(
+        method=method,
+        model=model,
+        recordings=recordings,
+        predictions=[predict(model, recording) for recording in recordings if _can_predict(recording)],
+        held_out=held_out,
+        undetermined=_open(model, fit),
+        notes=_notes(fit, method),
+        fit=fit,
+        history=history,
+    )
+
+
+def _learn(
+    recordings: list[Recording], vehicle: Vehicle, method: Method, on_progress: Progress
+) -> tuple[VehicleModel, Fit | None, dict[str, Array] | None]:
+    if method == "ml":
+        fit = fit_maximum_likelihood(recordings, on_progress=on_progress)
+        std = np.sqrt(np.diag(covariance(fit)))
+        values = dict(zip(NAMES, fit.parameters.tolist(), strict=True))
+        model = _model(recordings, vehicle, method, values, dict(zip(NAMES, std.tolist(), strict=True)))
+        model.noise.update(_noise(fit.noise))
+        return model, fit, None
+    on_progress("regression on CAR rows")
+    if method == "car":
+        values, stds = car_least_squares(recordings, vehicle)
+        return _model(recordings, vehicle, method, values, stds), None, None
+    values, stds, history = run_estimator(recordings, vehicle)
+    return _model(recordings, vehicle, method, values, stds), None, history
+
+
+def _noise(noise: Array) -> dict[str, float]:
+    named = {"pitch_rad": float(np.sqrt(noise[0])), "depth_m": float(np.sqrt(noise[1]))}
+    if noise[2:].any():
+        named |= {"heave_force_density": float(noise[2]), "pitch_moment_density": float(noise[3])}
+    return named
+
+
+def _model(
+    recordings: list[Recording],
+    vehicle: Vehicle,
+    method: Method,
+    values: dict[str, float],
+    std: dict[str, float],
+) -> VehicleModel:
+    files = {recording.name: recording.sha256 for recording in recordings}
+    channels = dict(pitch_rad="pitch", rudder_rad="rudder", depth_m="depth", speed_mps="speed")
+    valid_range = {}
+    for key, name in channels.items():
+        seen = np.concatenate([getattr(recording, name) for recording in recordings])
+        if np.isfinite(seen).any():
+            valid_range[key] = (float(np.nanmin(seen)), float(np.nanmax(seen)))
+    return VehicleModel(
+        vehicle=vehicle.name,
+        step=recordings[0].step,
+        values=values,
+        std=std,
+        noise={},
+        valid_range=valid_range,
+        provenance={
+            "method": method,
+            "version": program_version(),
+            "recordings": [{"name": name, "sha256": digest} for name, digest in files.items()],
+        },
+    )
+
+
+def _held_out(recordings: list[Recording], vehicle: Vehicle, method: Method) -> list[Prediction] | None:
+    """Learns from the first part and predicts the rest: whole recordings where there are several."""
+    if len(recordings) >= 3:
+        kept = max(1, round(len(recordings) * HELD_OUT_SHARE))
+        learn, test = recordings[:-kept], recordings[-kept:]
+    else:
+        ends = [recording.time[0] + (1.0 - HELD_OUT_SHARE) * recording.duration for recording in recordings]
+        learn = [r.between(-np.inf, end) for r, end in zip(recordings, ends, strict=True)]
+        test = [r.between(end, np.inf) for r, end in zip(recordings, ends, strict=True)]
+    test = [recording for recording in test if _can_predict(recording)]
+    if not test or any(recording.time.size < 50 for recording in learn):
+        return None
+    model, _, _ = _learn(learn, vehicle, method, lambda _: None)
+    return [predict(model, recording) for recording in test]
+
+
+def _can_predict(recording: Recording) -> bool:
+    """A free run needs somewhere to start: pitch and depth within the first 5 s."""
+    opening = recording.between(recording.time[0], recording.time[0] + 5.0)
+    return bool(np.isfinite(opening.pitch).any() and np.isfinite(opening.depth).any())
+
+
+def _open(model: VehicleModel, fit: Fit | None) -> list[str]:
+    if fit is None:
+        return [name for name in ("a1", "a2", "a3", "b1", "b2") if not isfinite(model.values[name])]
+    return undetermined(fit.parameters, covariance(fit), fit.free)
+
+
+def _notes(fit: Fit | None, method: Method) -> list[str]:
+    notes = []
+    if fit is None:
+        notes.append(
+            f"Method {method} regresses on measured signals: with sensor noise its estimates are biased "
+            "and its deviations too small. Use method ml for a trustworthy answer."
+        )
+        return notes
+    if not fit.converged:
+        notes.append("The search stopped before it had converged: treat the values with care.")
+    if fit.has_process_noise:
+        notes.append(
+            "Forces that the linear model does not hold act on the vehicle (waves, current or physics left "
+            "out): they were estimated as random force and moment, and the deviations include them."
+        )
+    if not all(is_white(e) for e in fit.whitened):
+        notes.append(
+            "The innovations are still coloured, so something systematic is left over; the deviations are "
+            "corrected for it."
+        )
+    at_bound = [
+        name
+        for name, value, free, low, high in _with_bounds(fit)
+        if free and (value <= low * (1 + 1e-9) or value >= high)
+    ]
+    if at_bound:
+        notes.append(f"At the edge of what is physically possible: {', '.join(at_bound)}.")
+    return notes
+
+
+def _with_bounds(fit: Fit) -> list[tuple[str, float, bool, float, float]]:
+    return list(zip(NAMES, fit.parameters, fit.free, LOWER, UPPER, strict=True))

@@ -1,0 +1,86 @@
+"""Any recording to its stretches on the time grid: text, telemetry, dataflash, CAN logs, the journal."""
+
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from bridge.logs import read_log
+from bridge.measurement import Measurement
+from firmware_model.sample import Sample
+from host.align import Aligner
+from host.csv_recording import read_csv_recording
+from host.errors import RecordingError
+from host.journal import read_journal
+from host.recording import NEEDED, Recording, file_sha256, split_at_gaps
+from host.vehicle import Vehicle
+
+
+def read_recordings(path: Path, vehicle: Vehicle, needs: tuple[str, ...] = NEEDED) -> list[Recording]:
+    """Stretches of one file, cut at reboots and long gaps; `counts` of each say what was refused and why.
+
+    needs  channels without which a stretch is of no use; the others may be missing altogether.
+
+    Raises RecordingError or LogFormatError with one line when nothing usable is in it.
+    """
+    if path.is_dir():
+        raise RecordingError(f"{path}: is a folder; name the recording inside it")
+    if not path.exists():
+        raise RecordingError(f"{path}: no such file")
+    if path.stat().st_size == 0:
+        raise RecordingError(f"{path}: is empty; nothing was recorded")
+    suffix = path.suffix.lower()
+    if suffix == ".csv":
+        return read_csv_recording(path, vehicle.csv, needs)
+    if suffix == ".jsonl":
+        journal = read_journal(path)
+        return _aligned(path, journal.measurements, journal.counts, vehicle, needs)
+    log = read_log(path, vehicle.mavlink, vehicle.can)
+    return _aligned(path, log.measurements, log.counts, vehicle, needs)
+
+
+def _aligned(
+    path: Path,
+    measurements: Iterable[Measurement],
+    counts: Counter[str],
+    vehicle: Vehicle,
+    needs: tuple[str, ...],
+) -> list[Recording]:
+    aligner = Aligner(vehicle.alignment)
+    segments: dict[int, list[Sample]] = {}
+    seen: Counter[str] = Counter()
+    for measurement in measurements:
+        seen[measurement.quantity.value] += 1
+        segment = aligner.segment  # a push that starts a new segment returns the end of the old one
+        segments.setdefault(segment, []).extend(aligner.push(measurement))
+    segments.setdefault(aligner.segment, []).extend(aligner.flush())
+    digest, total = file_sha256(path), counts + aligner.counts
+    pieces = []
+    for samples in filter(None, segments.values()):
+        whole = _recording(path.name, digest, samples, vehicle.alignment.step, total)
+        pieces += split_at_gaps(whole, max(1.0, 2.5 * whole.step), needs)
+    if not pieces:
+        lacking = [name for name in needs if not seen[name]]
+        reason = f"no {' and no '.join(lacking)} in it" if lacking else "never all at once for 10 steps"
+        raise RecordingError(
+            f"{path}: {', '.join(needs)} are needed together: {reason}; "
+            "check the vehicle file's channels (`--vehicle`)"
+        )
+    return pieces
+
+
+def _recording(name: str, sha256: str, samples: list[Sample], step: float, counts: Counter[str]) -> Recording:
+    time = np.array([sample.t_us for sample in samples], dtype=float) * 1e-6
+    return Recording(
+        name=name,
+        sha256=sha256,
+        time=time - time[0],
+        depth=np.array([sample.depth for sample in samples]),
+        pitch=np.array([sample.pitch for sample in samples]),
+        rudder=np.array([sample.rudder for sample in samples]),
+        speed=np.array([sample.speed for sample in samples]),
+        pitch_rate=np.array([sample.pitch_rate for sample in samples]),
+        step=step,
+        counts=counts,
+    )

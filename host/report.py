@@ -1,0 +1,170 @@
+"""The identification report: one self-contained HTML page a person understands by looking."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, select_autoescape
+
+from host.equations import PARAMETERS
+from host.identify import Identification
+from host.plots import free_run_plot, history_plot, overview_plot, whiteness_plot
+from host.predict import Prediction
+from host.uncertainty import MANOEUVRE
+
+MOST_PLOTS = 4  # a folder of short dives would drown the reader
+
+
+def write_report(result: Identification, path: Path) -> None:
+    """Writes report.html."""
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent), autoescape=select_autoescape(["j2", "html"])
+    )
+    page = environment.get_template("report.html.j2").render(
+        model=result.model,
+        method=result.method,
+        recordings=result.recordings,
+        files=[file["name"] for file in result.model.provenance["recordings"]],
+        duration=sum(recording.duration for recording in result.recordings),
+        undetermined=result.undetermined,
+        verdict=verdict(result),
+        notes=result.notes,
+        parameters=_parameters(result),
+        advice=advice(result),
+        scores=_scores(result),
+        noise=_noise(result),
+        plots=_plots(result),
+        reading=_reading(result),
+    )
+    path.write_text(page, encoding="utf-8")
+
+
+def verdict(result: Identification) -> str:
+    """The one sentence that answers "can I trust this model?"."""
+    if result.undetermined:
+        return (
+            f"This recording does not tell {_listed(result.undetermined)}: "
+            "another manoeuvre is needed before those values mean anything."
+        )
+    if result.fit is None:
+        known = "The regression gave all five coefficients"
+    else:
+        known = "All parameters are determined"
+    scored = result.held_out if result.held_out is not None else result.predictions
+    if not scored:
+        return f"{known}, but no stretch could be free-run to check them."
+    depth = np.mean([p.score.depth_fit_percent for p in scored])
+    pitch = np.mean([p.score.pitch_fit_percent for p in scored])
+    seen = "data it never saw" if result.held_out is not None else "the data it was learnt from"
+    return (
+        f"{known}. Running freely over {seen}, the model "
+        f"reproduces {depth:.1f} % of the depth and {pitch:.1f} % of the pitch motion."
+    )
+
+
+def advice(result: Identification) -> list[str]:
+    """One line for each manoeuvre that would show an open parameter."""
+    lines: dict[str, list[str]] = {}
+    for name in result.undetermined:
+        lines.setdefault(MANOEUVRE[name], []).append(name)
+    return [f"{', '.join(names)}: {manoeuvre}" for manoeuvre, names in lines.items()]
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _parameters(result: Identification) -> list[dict[str, Any]]:
+    rows = []
+    for parameter in PARAMETERS:
+        value, std = result.model.values[parameter.name], result.model.std[parameter.name]
+        is_known = np.isfinite(value)
+        rows.append(
+            {
+                "name": parameter.name,
+                "meaning": parameter.meaning,
+                "unit": parameter.unit,
+                "value": f"{value:.4g}" if is_known else "not found",
+                "std": f"{std:.2g}" if std > 0.0 else "given" if is_known else "",
+                "interval": f"{value - 1.96 * std:.4g} to {value + 1.96 * std:.4g}" if std > 0.0 else "",
+                "open": parameter.name in result.undetermined,
+            }
+        )
+    return rows
+
+
+def _scores(result: Identification) -> list[dict[str, Any]]:
+    groups: list[tuple[str, list[Prediction]]] = [("learnt from", result.predictions)]
+    if result.held_out is not None:
+        groups.append(("held out", result.held_out))
+    return [
+        {
+            "name": f"{prediction.recording.name}, {kind}",
+            "depth": _figure(prediction.score.depth_rmse_m, ".3f"),
+            "pitch": _figure(np.degrees(prediction.score.pitch_rmse_rad), ".3f"),
+            "depth_fit": _figure(prediction.score.depth_fit_percent, ".1f"),
+            "pitch_fit": _figure(prediction.score.pitch_fit_percent, ".1f"),
+            "samples": prediction.score.samples,
+        }
+        for kind, predictions in groups
+        for prediction in predictions
+    ]
+
+
+def _figure(value: float, form: str) -> str:
+    if not np.isfinite(value):
+        return "diverged"
+    return f"{value:{form}}" if abs(value) < 1e5 else f"{value:.1e}"
+
+
+def _noise(result: Identification) -> str:
+    noise = result.model.noise
+    if not noise:
+        return ""
+    return f"pitch {np.degrees(noise['pitch_rad']):.3f} deg, depth {1000 * noise['depth_m']:.1f} mm"
+
+
+def _plots(result: Identification) -> list[dict[str, str]]:
+    plots = []
+    for prediction in (result.held_out or [])[:1]:
+        if np.isfinite(prediction.states).all():
+            caption = f"{prediction.recording.name}: free run over the held-out part."
+            plots.append({"uri": free_run_plot(prediction), "caption": caption})
+    for prediction in result.predictions[:MOST_PLOTS]:
+        if np.isfinite(prediction.states).all():
+            caption = f"{prediction.recording.name}: free run over what it was learnt from."
+            plots.append({"uri": free_run_plot(prediction), "caption": caption})
+    if not plots:
+        plots.append({"uri": overview_plot(result.recordings[0]), "caption": "The recording alone."})
+    if result.fit is not None:
+        caption = "Correlation of the innovations; inside the band nothing systematic is left over."
+        plots.append(
+            {
+                "uri": whiteness_plot(result.fit.whitened[0], result.recordings[0].step),
+                "caption": caption,
+            }
+        )
+    if result.history:
+        plots.append(
+            {
+                "uri": history_plot(result.history, result.model.values),
+                "caption": "Estimates while the recursion converges.",
+            }
+        )
+    return plots
+
+
+def _reading(result: Identification) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": recording.name,
+            "rows": recording.time.size,
+            "step": f"{recording.step:.4g}",
+            "pitch": f"{100 * np.isnan(recording.pitch).mean():.0f} %",
+            "depth": f"{100 * np.isnan(recording.depth).mean():.0f} %",
+            "counts": ", ".join(
+                f"{name} {count}" for name, count in sorted(recording.counts.items()) if count
+            ),
+        }
+        for recording in result.recordings
+    ]

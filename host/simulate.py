@@ -1,0 +1,55 @@
+"""A model flown on given plane movement, without looking at anything else but where it starts."""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from host.model import VehicleModel
+from host.predict import SETTLING_SPAN, estimate_initial_state
+from host.propagate import free_run, inputs_of
+from host.recording import Array, Recording
+
+COLUMNS = ("time_s", "depth_m", "pitch_rad", "rudder_rad", "speed_mps", "pitch_rate_radps", "heave_mps")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Simulation:
+    """States [w, q, theta, zeta] (4, N) at the rows of `time`, with the rudder and speed that drove them."""
+
+    time: Array
+    states: Array
+    rudder: Array
+    speed: Array
+
+
+def simulate(model: VehicleModel, recording: Recording) -> Simulation:
+    """Free run on the recording's rudder.
+
+    It starts where the first 5 s of depth and pitch say; at rest at depth 0 where these are not recorded.
+    """
+    inputs = inputs_of(recording)
+    opening = recording.between(recording.time[0], recording.time[0] + SETTLING_SPAN)
+    if np.isfinite(opening.depth).any() and np.isfinite(opening.pitch).any():
+        initial = estimate_initial_state(model.parameters, opening, inputs)
+    else:
+        initial = np.zeros(4)
+    speed = recording.speed if recording.has_speed else np.full(recording.time.size, model.values["u0"])
+    return Simulation(
+        time=recording.time,
+        states=free_run(model.parameters, initial, inputs),
+        rudder=recording.rudder,
+        speed=speed,
+    )
+
+
+def write_simulation(runs: list[Simulation], path: Path) -> None:
+    """Writes SIM.csv in the project's own recording format, with pitch rate and heave added."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS)
+        for run in runs:
+            w, q, theta, zeta = run.states
+            table = np.column_stack([run.time, zeta, theta, run.rudder, run.speed, q, w])
+            writer.writerows([f"{value:.9g}" for value in row] for row in table)

@@ -1,0 +1,60 @@
+"""`mils identify`: recordings of one vehicle to model.json and a report."""
+
+import argparse
+from pathlib import Path
+
+from tools.bench import joint_or_each, load_vehicle, progress, read_all
+
+HELP = "identify a vehicle from its recordings (bench)"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "recordings", metavar="RECORDING", nargs="+", type=Path, help=".csv .tlog .BIN .log .asc .blf .jsonl"
+    )
+    parser.add_argument("--vehicle", type=Path, help="vehicle file: columns, units, channels, speed")
+    parser.add_argument(
+        "--method",
+        choices=("car", "mils", "ml"),
+        default="ml",
+        help="ml: maximum likelihood (default, most accurate); mils: the live estimator; car: least squares",
+    )
+    parser.add_argument(
+        "--each", action="store_true", help="one model for each recording instead of one for all"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("."), metavar="DIR", help="where model.json and report.html go"
+    )
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def run(args: argparse.Namespace) -> int:
+    from host.identify import identify
+    from host.model import write_model
+    from host.report import advice, verdict, write_report
+
+    vehicle = load_vehicle(args.vehicle)
+    worst = 0
+    with progress(args.quiet) as say:
+        read = read_all(args.recordings, vehicle, say)
+        for recordings, folder in joint_or_each(read, args.out, args.each):
+            result = identify(recordings, vehicle, args.method, say)
+            folder.mkdir(parents=True, exist_ok=True)
+            write_model(result.model, folder / "model.json")
+            say("writing the report")
+            write_report(result, folder / "report.html")
+            print(verdict(result))
+            for name, value in result.model.values.items():
+                std, unit = result.model.std[name], result.model.units[name]
+                print(
+                    f"  {name:13s} {value:+10.5f} +- {std:.5f} {unit}"
+                    if std
+                    else f"  {name:13s} {value:+10.5f} {unit}"
+                )
+            for line in advice(result):
+                print(f"  to learn {line}")
+            for note in result.notes:
+                print(f"  note: {note}")
+            print(f"model:  {folder / 'model.json'}\nreport: {folder / 'report.html'}")
+            worst = max(worst, 1 if result.undetermined else 0)
+    return worst
