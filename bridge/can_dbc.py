@@ -43,9 +43,9 @@ class DbcDialect:
         self._by_id: dict[tuple[int, bool], Any] = {
             (message.frame_id, message.is_extended_frame): message for message in database.messages
         }
+        self._mapped: dict[str, list[Any]] = {}  # cantools' signals that are used, by message
         for signal in signals:
-            self._check(signal)
-        self._mapped = {signal.message for signal in signals}
+            self._mapped.setdefault(signal.message, []).extend(self._used(signal))
 
     def decode(self, packet: Packet) -> CanMessage | None:
         message = self._by_id.get((packet.can_id or 0, packet.extended))
@@ -53,7 +53,8 @@ class DbcDialect:
             self._counts["other"] += 1
             return None
         self._counts[message.name] += 1
-        if message.name not in self._mapped:
+        mapped = self._mapped.get(message.name)
+        if mapped is None:
             return None
         if len(packet.data) < message.length:
             self._counts["refused.short"] += 1
@@ -63,11 +64,11 @@ class DbcDialect:
         except Exception:  # KeyError and DecodeError of unknown multiplexers, among others
             self._counts["refused.not_decodable"] += 1
             return None
-        for signal in message.signals:
+        for signal in mapped:
             if not _is_in_range(signal, fields.get(signal.name)):
                 # A value that its own DBC excludes is a fault code or garbage, also when it looks plausible.
                 self._counts["refused.range"] += 1
-                del fields[signal.name]
+                fields.pop(signal.name)
         return CanMessage(message.name, message.name, fields)
 
     def encode(self, name: str, fields: Mapping[str, float], t_us: int) -> list[Packet]:
@@ -90,28 +91,34 @@ class DbcDialect:
         packets = []
         for name, message in self._by_name.items():
             signals = [signal.name for signal in message.signals]
-            is_time = name == "ESTIMATE_TIME"
-            if not name.startswith(_ESTIMATE) or not (is_time or any(signal in values for signal in signals)):
+            is_state = name == "ESTIMATE_STATE"
+            if not name.startswith(_ESTIMATE) or not (
+                is_state or any(signal in values for signal in signals)
+            ):
                 continue
-            fields = {signal: values.get(signal, 0.0 if is_time else nan) for signal in signals}
-            if is_time:
+            fields = {signal: values.get(signal, 0.0 if is_state else nan) for signal in signals}
+            if is_state:
                 period_us = self.clock_period_us(name, "time")
                 fields["time"] = (t_us if period_us is None else t_us % period_us) * 1e-6
             packets += self.encode(name, fields, t_us)
         return packets
 
-    def _check(self, signal: CanSignal) -> None:
+    def _used(self, signal: CanSignal) -> list[Any]:
+        """cantools' signals of a table entry. Raises BridgeError when the DBC has no such signal."""
         message = self._by_name.get(signal.message)
         if message is None:
-            known = ", ".join(sorted(self._by_name))
-            raise BridgeError(f"can.signals message must be one of the DBC's: {known} (got {signal.message})")
-        names = [known.name for known in message.signals]
+            names = ", ".join(sorted(self._by_name))
+            raise BridgeError(f"can.signals message must be one of the DBC's: {names} (got {signal.message})")
+        known = {each.name: each for each in message.signals}
         wanted = [signal.signal, *(selector.signal for selector in signal.only)]
-        for name in wanted if signal.time is None else [*wanted, signal.time]:
-            if name not in names:
+        if signal.time is not None:
+            wanted.append(signal.time)
+        for name in wanted:
+            if name not in known:
                 raise BridgeError(
-                    f"can.signals signal of {signal.message} must be one of {', '.join(names)} (got {name})"
+                    f"can.signals signal of {signal.message} must be one of {', '.join(known)} (got {name})"
                 )
+        return [known[name] for name in wanted]
 
 
 def _is_in_range(signal: Any, value: Any) -> bool:

@@ -55,19 +55,21 @@ class CanMap:
     rudder_instance   NMEA 2000 Instance, or DroneCAN actuator id, of the stern plane in the default tables
     source_address    only this sender; None: per signal the first that speaks, until it falls silent
     water_density     kg/m3
-    surface_pressure  Pa, of the air above the water
+    gravity           m/s2
+    surface_pressure_hpa  hPa, of the air above the water
     publish           send estimates onto the bus; None: only where the default DBC is in use
     """
 
     kind: Literal["dbc", "nmea2000", "dronecan"] = "dbc"
     dbc: str | None = None
     signals: tuple[CanSignal, ...] = ()
-    pitch_sign: float = 1.0
-    rudder_sign: float = 1.0
+    pitch_sign: int = 1
+    rudder_sign: int = 1
     rudder_instance: int = 0
     source_address: int | None = None
     water_density: float = 1025.0
-    surface_pressure: float = 101325.0
+    gravity: float = STANDARD_GRAVITY
+    surface_pressure_hpa: float = 1013.25
     publish: bool | None = None
 
     def __post_init__(self) -> None:
@@ -80,16 +82,18 @@ class CanMap:
         if self.kind == "dbc" and self.dbc is not None and not self.signals:
             raise ValueError("signals must name the messages of your own dbc (got none)")
         for name in ("pitch_sign", "rudder_sign"):
-            if getattr(self, name) not in (1.0, -1.0):
+            if getattr(self, name) not in (1, -1):
                 raise ValueError(f"{name} must be 1 or -1 (got {getattr(self, name)})")
         if not 0 <= self.rudder_instance <= 255:
             raise ValueError(f"rudder_instance must be 0 to 255 (got {self.rudder_instance})")
         if self.source_address is not None and not 0 <= self.source_address <= 253:
             raise ValueError(f"source_address must be 0 to 253 (got {self.source_address})")
-        if not 900.0 <= self.water_density <= 1300.0:
-            raise ValueError(f"water_density must be 900 to 1300 kg/m3 (got {self.water_density})")
-        if not 50e3 <= self.surface_pressure <= 120e3:
-            raise ValueError(f"surface_pressure must be 50000 to 120000 Pa (got {self.surface_pressure})")
+        if not 500.0 <= self.water_density <= 1500.0:
+            raise ValueError(f"water_density must be 500 to 1500 kg/m3 (got {self.water_density})")
+        if not 9.0 <= self.gravity <= 10.0:
+            raise ValueError(f"gravity must be 9 to 10 m/s2 (got {self.gravity})")
+        if not 300.0 <= self.surface_pressure_hpa <= 1200.0:
+            raise ValueError(f"surface_pressure_hpa must be 300 to 1200 (got {self.surface_pressure_hpa})")
 
     @property
     def publishes(self) -> bool:
@@ -115,21 +119,22 @@ class CanMap:
         """Quantity and SI value of a raw signal value, in this program's signs."""
         value = signal.scale * raw + signal.offset
         if signal.quantity == "pressure":
-            return Quantity.DEPTH, (value - self.surface_pressure) / (self.water_density * STANDARD_GRAVITY)
+            surface = 100.0 * self.surface_pressure_hpa
+            return Quantity.DEPTH, (value - surface) / (self.water_density * self.gravity)
         return Quantity(signal.quantity), self._sign(signal) * value
 
     def from_quantity(self, signal: CanSignal, value: float) -> float:
         """Inverse of `to_quantity`."""
         if signal.quantity == "pressure":
-            value = self.surface_pressure + self.water_density * STANDARD_GRAVITY * value
+            value = 100.0 * self.surface_pressure_hpa + self.water_density * self.gravity * value
         else:
             value *= self._sign(signal)
         return (value - signal.offset) / signal.scale
 
-    def _sign(self, signal: CanSignal) -> float:
+    def _sign(self, signal: CanSignal) -> int:
         if signal.quantity in ("pitch", "pitch_rate"):
             return self.pitch_sign
-        return self.rudder_sign if signal.quantity == "rudder" else 1.0
+        return self.rudder_sign if signal.quantity == "rudder" else 1
 
     def _nmea2000_table(self) -> tuple[CanSignal, ...]:
         # 128267 "water depth" is the water UNDER the transducer and never the vehicle's depth.
