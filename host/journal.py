@@ -7,13 +7,13 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from itertools import count
 from pathlib import Path
 from typing import Any
 
 from bridge.measurement import Measurement, Quantity
 from host.errors import HostError, RecordingError
+from host.version import program_version
 
 SCHEMA = 1
 SUFFIX = ".jsonl"
@@ -158,14 +158,6 @@ def read_journal(path: Path) -> JournalReading:
         counts=counts,
         notes=_notes(counts["damaged"], is_cut=kind == "damaged" and not line.endswith(b"\n")),
     )
-
-
-def program_version() -> str:
-    """The version of this program as installed, for headers and reports."""
-    try:
-        return version("auv-mils")
-    except PackageNotFoundError:
-        return "not installed"
 
 
 def _create(place: Path, stem: str) -> tuple[Path, int]:

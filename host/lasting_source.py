@@ -13,7 +13,7 @@ _LONGEST_WAIT = 10.0  # s
 
 
 class LastingSource:
-    """Reads from sources that `open_source` opens, one after the other.
+    """Reads from `source`, and when its link closes from the next one that `reopen` opens.
 
     A link that closes is reported once and opened again, at first after 0.5 s and then ever more seldom, for
     `reopen_for` s. The boots of a reopened source count on from those before. The counts go on as well, with
@@ -26,25 +26,25 @@ class LastingSource:
 
     def __init__(
         self,
-        open_source: Callable[[], Source],
+        source: Source,
+        reopen: Callable[[], Source],
         *,
         reopen_for: float,
         clock: Callable[[], float],
         sleep: Callable[[float], None],
         say: Callable[[str], None],
     ) -> None:
-        """Opens the first source; a LinkError of this first attempt is the caller's."""
-        self._open_source = open_source
+        self._source: Source | None = source
+        self._reopen = reopen
         self._reopen_for = reopen_for
         self._clock = clock
         self._sleep = sleep
         self._say = say
-        self._source: Source | None = open_source()
         self._earlier: Counter[str] = Counter()
         self._first_boot = self._last_boot = 0
         self._lost_at = self._next_attempt = 0.0
         self._wait = _FIRST_WAIT
-        self._is_over = False
+        self._over: LinkClosed | None = None
 
     @property
     def counts(self) -> Counter[str]:
@@ -52,22 +52,22 @@ class LastingSource:
 
     def read(self, timeout_s: float) -> list[Measurement]:
         """As `Source.read`; [] while the link is gone. Raises LinkClosed once it is given up."""
-        if self._is_over:
-            raise LinkClosed("link is closed")
+        if self._over is not None:
+            raise self._over
         if self._source is None:
-            self._reopen(timeout_s)
+            self._try_again(timeout_s)
             return []
         try:
             measurements = self._source.read(timeout_s)
         except LinkClosed as closed:
             self._lose(closed)
-            return []
+            return self.read(timeout_s)
         renumbered = [replace(m, boot=self._first_boot + m.boot) for m in measurements]
         self._last_boot = max([self._last_boot, *(m.boot for m in renumbered)])
         return renumbered
 
     def publish(self, t_us: int, values: Mapping[str, float]) -> None:
-        """As `Source.publish`; nothing while the link is gone."""
+        """As `Source.publish`; nothing while the link is gone. The next read tells of a link that closes."""
         if self._source is not None:
             try:
                 self._source.publish(t_us, values)
@@ -77,7 +77,7 @@ class LastingSource:
     def close(self) -> None:
         """May be called twice."""
         self._drop()
-        self._is_over = True
+        self._over = self._over or LinkClosed("the link was closed here")
 
     def _drop(self) -> None:
         if self._source is not None:
@@ -88,8 +88,8 @@ class LastingSource:
     def _lose(self, cause: LinkClosed) -> None:
         self._drop()
         if self._reopen_for <= 0:
-            self._is_over = True
-            raise cause
+            self._over = cause
+            return
         self._earlier["link.lost"] += 1
         self._first_boot = self._last_boot + 1
         self._lost_at = self._clock()
@@ -97,17 +97,17 @@ class LastingSource:
         self._next_attempt = self._lost_at + self._wait
         self._say(f"link lost ({cause}); trying to open it again for {self._reopen_for:g} s")
 
-    def _reopen(self, timeout_s: float) -> None:
+    def _try_again(self, timeout_s: float) -> None:
         now = self._clock()
         if now < self._next_attempt:
             self._sleep(min(timeout_s, self._next_attempt - now))
             return
         try:
-            self._source = self._open_source()
+            self._source = self._reopen()
         except BridgeError as error:
             if now - self._lost_at >= self._reopen_for:
-                self._is_over = True
-                raise LinkClosed(f"link lost for {self._reopen_for:g} s and given up ({error})") from error
+                self._over = LinkClosed(f"link lost for {self._reopen_for:g} s and given up ({error})")
+                raise self._over from error
             self._wait = min(2 * self._wait, _LONGEST_WAIT)
             self._next_attempt = self._clock() + self._wait
             return
