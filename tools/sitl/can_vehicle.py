@@ -64,14 +64,13 @@ class CanVehicle:
             name: Instrument(getattr(scenario.sensors, name), stream(seed, name)) for name in COLUMNS
         }
         self.database = load_dbc(dbc)
+        rng = stream(seed, "messages")
         self.frames: list[tuple[Any, dict[str, str], Timetable]] = []
         for message in self.database.messages:
             carried = {s.name: channel_of[s.name] for s in message.signals if s.name in channel_of}
             if carried:
-                instrument = self.instruments[next(iter(carried.values()))]
-                self.frames.append(
-                    (message, carried, Timetable(instrument.channel.rate_hz, instrument.deviation))
-                )
+                settings = self.instruments[next(iter(carried.values()))].channel
+                self.frames.append((message, carried, Timetable(settings.rate_hz, settings.jitter_s, rng)))
         if not self.frames:
             raise TransportError(f"dbc {dbc} must have a signal named one of {', '.join(channel_of)}")
 

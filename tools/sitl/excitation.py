@@ -4,7 +4,7 @@ import csv
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import cycle, pairwise
-from math import pi, sin, sqrt
+from math import inf, isfinite, pi, sin, sqrt
 from pathlib import Path
 from typing import Literal, Protocol
 
@@ -84,7 +84,7 @@ class _Levels:
 
     def __call__(self, t_s: float, depth: float, pitch: float, pitch_rate: float) -> float:  # noqa: ARG002
         while t_s > self.until - 1e-9:
-            held, self.level = next(self.levels, (float("inf"), self.level))
+            held, self.level = next(self.levels, (inf, self.level))
             self.until += held
         return self.level
 
@@ -144,12 +144,11 @@ def _read_csv(path: Path) -> list[tuple[float, float]]:
             f"excitation.file {path} must have numbers in time_s and rudder_rad ({error})"
         ) from error
     require(bool(rows), "excitation.file", "hold at least one row", str(path))
+    finite = all(isfinite(t_s) and isfinite(level) for t_s, level in rows)
+    require(finite, "excitation.file", "hold finite numbers", str(path))
     in_order = all(later[0] > earlier[0] for earlier, later in pairwise(rows))
     require(in_order, "excitation.file", "have rising time_s", str(path))
-    zero = rows[0][0]
-    return [(later[0] - earlier[0], earlier[1]) for earlier, later in pairwise(rows)] + [
-        (rows[-1][0] - zero + float("inf"), rows[-1][1])
-    ]
+    return [(later[0] - earlier[0], earlier[1]) for earlier, later in pairwise([*rows, (inf, 0.0)])]
 
 
 def make_law(excitation: Excitation, start_depth: float, folder: Path, rng: np.random.Generator) -> Law:

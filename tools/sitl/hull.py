@@ -7,6 +7,7 @@ from tools.sitl.effects import Effects
 from tools.sitl.strict import require
 
 GRAVITY = 9.80665  # m/s2
+HULL_HEIGHT = 0.3  # m, over which the buoyancy is lost when the hull leaves the water
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,6 +94,8 @@ class Hydrodynamics:
         if self.ballast.size != 0.0 and t_s >= self.ballast.at_s:
             weight += self.ballast.size * GRAVITY
         buoyancy = self.buoyancy - self.compression * (depth - self.start_depth)
+        if depth < 0.0:
+            buoyancy *= max(1.0 + depth / HULL_HEIGHT, 0.0)
         return weight - buoyancy, buoyancy
 
     def rates(

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from tools.sitl.plant import stream
 from tools.sitl.scenario import Scenario
-from tools.sitl.schedule import Timetable, regular
+from tools.sitl.schedule import Timetable
 from tools.sitl.sensors import Instrument
 from tools.sitl.track import Track
 from tools.sitl.transport import Transport
@@ -55,6 +55,7 @@ class MavlinkVehicle:
         self.sent: Counter[str] = Counter()
         self.heard: Counter[str] = Counter()
         self.values: dict[str, float] = {}
+        self.rng = stream(seed, "messages")
         self.depth_rate_hz = scenario.sensors.depth.rate_hz
         self.instruments = {
             name: Instrument(getattr(scenario.sensors, name), stream(seed, name))
@@ -91,9 +92,16 @@ class MavlinkVehicle:
         self.mav.robust_parsing = True
         self.sampled = -1
         self.depth = math.nan
-        jitter = {"ATTITUDE": "pitch", "SCALED_PRESSURE2": "depth", "SERVO_OUTPUT_RAW": "rudder"}
+        jitter_s = {
+            name: self.instruments[channel].channel.jitter_s
+            for name, channel in (
+                ("ATTITUDE", "pitch"),
+                ("SCALED_PRESSURE2", "depth"),
+                ("SERVO_OUTPUT_RAW", "rudder"),
+            )
+        }
         self.timetables = {
-            name: Timetable(rate, self.instruments[jitter[name]].deviation if name in jitter else regular)
+            name: Timetable(rate, jitter_s.get(name, 0.0), self.rng)
             for name, rate in self.default_rates.items()
         }
         if self.settings.boot_text:

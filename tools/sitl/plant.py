@@ -13,11 +13,16 @@ from tools.sitl.hull import Hydrodynamics, Motion
 from tools.sitl.scenario import Scenario
 from tools.sitl.sea import Sea
 from tools.sitl.sensors import DepthAndPitchSensing
+from tools.sitl.strict import ScenarioError
 
 
 def stream(seed: int, name: str) -> np.random.Generator:
     """Random numbers of one purpose: other purposes neither see nor shift them."""
     return np.random.default_rng([seed, zlib.crc32(name.encode())])
+
+
+_MOST_TURN = 100.0  # rad/s; beyond these the numbers mean nothing
+_MOST_SPEED = 100.0  # m/s
 
 
 class Instant(NamedTuple):
@@ -85,6 +90,12 @@ class Plant:
             x[4] + sixth * (k1[4] + 2 * (k2[4] + k3[4]) + k4[4]),
         )
         self.steps += 1
+        if not (abs(self.motion[2]) < _MOST_TURN and abs(self.motion[1]) < _MOST_SPEED):
+            state = ", ".join(f"{value:.3g}" for value in self.motion)
+            raise ScenarioError(
+                f"hull and effects must let the motion stay finite (got u, w, q, pitch, depth = {state}"
+                f" after {self.steps * self.step_s:.2f} s)"
+            )
         self.now = self._look()
         return self.now
 

@@ -2,40 +2,35 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+
+import numpy as np
 
 
-def regular() -> float:
-    """No deviation."""
-    return 0.0
-
-
-@dataclass(slots=True)
 class Timetable:
-    """One message's regular times since a boot; each may be off by a random share of a sample.
+    """One message's regular times since a boot, each off by up to `jitter_s`; a rate of 0 means never."""
 
-    rate_hz  0: never
-    off      the deviation of the next time, s
-    """
-
-    rate_hz: float
-    off: Callable[[], float] = regular
-    count: int = 0
-    due_s: float = field(init=False, default=math.inf)
-
-    def __post_init__(self) -> None:
-        self.set_rate(self.rate_hz, -1.0)
+    def __init__(self, rate_hz: float, jitter_s: float, rng: np.random.Generator) -> None:
+        self.jitter_s = jitter_s
+        self.rng = rng
+        self.rate_hz = rate_hz
+        self.count = 0
+        self.due_s = 0.0 if rate_hz > 0.0 else math.inf
 
     def set_rate(self, rate_hz: float, now_s: float) -> None:
         """From the next whole multiple of the new interval on."""
         self.rate_hz = rate_hz
-        self.count = max(math.floor(now_s * rate_hz + 1e-6), -1)
+        self.count = math.floor(now_s * rate_hz + 1e-6)
         self.advance()
 
     def advance(self) -> None:
         """Moves on to the next time."""
         self.count += 1
-        self.due_s = max(self.count / self.rate_hz + self.off(), 0.0) if self.rate_hz > 0.0 else math.inf
+        if self.rate_hz == 0.0:
+            self.due_s = math.inf
+            return
+        self.due_s = self.count / self.rate_hz
+        if self.jitter_s > 0.0:
+            self.due_s += min(self.jitter_s, 0.49 / self.rate_hz) * self.rng.uniform(-1.0, 1.0)
 
 
 class Pace:

@@ -106,11 +106,6 @@ class Instrument:
         """Whether the sample of this time is lost."""
         return not self.arrives(np.array([t_s]))[0]
 
-    def deviation(self) -> float:
-        """How far the next sample is off its regular time, s."""
-        limit = self.channel.jitter_s
-        return float(self.rng.uniform(-limit, limit)) if limit > 0.0 else 0.0
-
 
 class DepthAndPitchSensing:
     """The physical side of the instruments: where they sit and how slowly they answer."""
