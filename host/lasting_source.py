@@ -50,6 +50,11 @@ class LastingSource:
     def counts(self) -> Counter[str]:
         return self._earlier + self._source.counts if self._source else Counter(self._earlier)
 
+    @property
+    def notes(self) -> list[str]:
+        """What the source decided on the user's behalf, if it keeps such notes."""
+        return list(getattr(self._source, "notes", ()))
+
     def read(self, timeout_s: float) -> list[Measurement]:
         """As `Source.read`; [] while the link is gone. Raises LinkClosed once it is given up."""
         if self._over is not None:

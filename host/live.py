@@ -89,6 +89,7 @@ class LiveLoop:
         self._silence = SilenceWatch(vehicle.link.silence, self._started)
         self._measurements: Counter[Quantity] = Counter()
         self._samples: Counter[str] = Counter()
+        self._noted: set[str] = set()
         self._boot = 0
         self._published_t_us: int | None = None
         self._synced = self._saved = self._told = self._started
@@ -183,6 +184,10 @@ class LiveLoop:
         now = self._clock()
         for sentence in self._silence.check(now):
             self._note("silence", sentence)
+        for sentence in self._source.notes:
+            if sentence not in self._noted:
+                self._noted.add(sentence)
+                self._note("source", sentence)
         if now - self._synced >= self._vehicle.journal.sync_period:
             self._synced = now
             self._journal.sync()

@@ -30,6 +30,10 @@ def shared(**sources: str) -> dict[str, dict[str, str]]:
     return {_SHARED: sources}
 
 
+MAY_BE_INFINITE: dict[str, bool] = {"infinite": True}
+"""Metadata of a float field that takes inf. One of type `float | None` takes it anyway, as "no limit"."""
+
+
 def read_toml(path: Path, kind: type[T]) -> T:
     """Builds `kind` from the file; paths in it are relative to the file's folder. Raises ConfigError."""
     try:
@@ -97,7 +101,8 @@ class _Builder:
                 except _Broken as broken:
                     raise _Broken(_named_by_source(str(broken), at, where, sources)) from broken.__cause__
             elif name in table:
-                values[name] = self.value(hints[name], table[name], at)
+                takes_infinity = field.metadata.get("infinite", False)
+                values[name] = self.value(hints[name], table[name], at, takes_infinity)
             elif _default(field) is dataclasses.MISSING:
                 raise _Broken(f"{at} is missing")
         try:
@@ -120,7 +125,7 @@ class _Builder:
             given[key] = functools.reduce(getattr, rest, built.get(first, _default(fields[first])))
         return given
 
-    def value(self, kind: Any, value: object, where: str) -> Any:
+    def value(self, kind: Any, value: object, where: str, takes_infinity: bool = False) -> Any:
         origin, arguments = get_origin(kind), get_args(kind)
         if dataclasses.is_dataclass(kind):
             return self.dataclass(kind if isinstance(kind, type) else type(kind), value, where)
@@ -132,13 +137,13 @@ class _Builder:
             return kind(_choice(tuple(member.value for member in kind), value, where))
         if origin is tuple:
             return self.array(arguments, value, where)
-        return self.scalar(kind, value, where)
+        return self.scalar(kind, value, where, takes_infinity)
 
     def union(self, kinds: tuple[Any, ...], value: object, where: str) -> Any:
         """The first member that takes the value; with one member beside None, its own message."""
         kinds = tuple(kind for kind in kinds if kind is not NoneType)
         if len(kinds) == 1:
-            return self.value(kinds[0], value, where)
+            return self.value(kinds[0], value, where, takes_infinity=True)
         for kind in kinds:
             try:
                 return self.value(kind, value, where)
@@ -156,7 +161,7 @@ class _Builder:
         pairs = zip(kinds, value, strict=True)
         return tuple(self.value(kind, item, f"{where}[{i}]") for i, (kind, item) in enumerate(pairs))
 
-    def scalar(self, kind: Any, value: object, where: str) -> Any:
+    def scalar(self, kind: Any, value: object, where: str, takes_infinity: bool) -> Any:
         if kind is float and isinstance(value, int) and not isinstance(value, bool):
             value = float(value) if abs(value) < 2**53 else math.nan
         if kind is float and value in ("inf", "-inf"):
@@ -167,6 +172,8 @@ class _Builder:
             raise _wrong_type(where, _NAMES[kind], value)
         if isinstance(value, float) and math.isnan(value):
             raise _Broken(f"{where} must be a number (got nan, or a whole number beyond 2^53)")
+        if isinstance(value, float) and math.isinf(value) and not takes_infinity:
+            raise _Broken(f"{where} must be finite (got {value})")
         return value
 
 

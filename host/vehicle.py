@@ -11,7 +11,7 @@ from firmware_model.config import EstimatorConfig
 from host.align import AlignConfig
 from host.csv_map import CsvMap
 from host.state import fingerprint
-from host.toml_config import build, read_toml, shared, to_table, to_toml
+from host.toml_config import MAY_BE_INFINITE, build, read_toml, shared, to_table, to_toml
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,15 +19,16 @@ class LinkConfig:
     """Where the measurements come from."""
 
     url: str = "udp:127.0.0.1:14550"  # scheme:address, see `mils doctor`
-    log_speed: float = 1.0  # >= 0, times real time for log: links; 0 as fast as it can be read
+    # > 0, times real time for log: links; inf as fast as it can be read
+    log_speed: float = field(default=1.0, metadata=MAY_BE_INFINITE)
     silence: float = 5.0  # s, > 0: a quantity that does not come for so long is reported, once
     reopen_for: float = 600.0  # s, >= 0: how long a lost link is tried again; 0 never
 
     def __post_init__(self) -> None:
         if ":" not in self.url:
             raise ValueError(f"url must be scheme:address, e.g. udp:127.0.0.1:14550 (got {self.url!r})")
-        if not 0 <= self.log_speed <= 1e6:
-            raise ValueError(f"log_speed must be 0 to 1e6 (got {self.log_speed})")
+        if not self.log_speed > 0:
+            raise ValueError(f"log_speed must be above 0 (got {self.log_speed})")
         if not 0 < self.silence <= 1e6:
             raise ValueError(f"silence must be above 0 s (got {self.silence})")
         if not 0 <= self.reopen_for <= 1e9:

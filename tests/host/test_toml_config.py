@@ -1,6 +1,7 @@
 """Strict TOML: every rule broken once, and what is written reads back equal."""
 
-from dataclasses import dataclass
+import tomllib
+from dataclasses import dataclass, field
 from enum import StrEnum
 from math import inf
 from pathlib import Path
@@ -11,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from host.errors import ConfigError
-from host.toml_config import build, read_toml, to_table, to_toml
+from host.toml_config import MAY_BE_INFINITE, build, read_toml, to_table, to_toml
 
 
 class Mode(StrEnum):
@@ -23,6 +24,7 @@ class Mode(StrEnum):
 class Channel:
     number: int
     scale: float = 1.0
+    speed: float = field(default=1.0, metadata=MAY_BE_INFINITE)
 
     def __post_init__(self) -> None:
         if not 1 <= self.number <= 16:
@@ -31,7 +33,7 @@ class Channel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Inner:
-    forgetting_time: float = 60.0
+    forgetting_time: float | None = 60.0
     channels: tuple[Channel, ...] = ()
     pair: tuple[int, float] = (1, 2.0)
     first: Channel | None = None
@@ -128,6 +130,10 @@ def test_every_kind_of_field_is_read(tmp_path: Path) -> None:
             'name = "x"\n[inner]\nchannels = [{ number = 1 }, { number = 17 }]',
             "vehicle.toml: inner.channels[1].number must be 1 to 16 (got 17)",
         ),
+        (
+            'name = "x"\n[inner]\nfirst = { number = 1, scale = inf }',
+            "vehicle.toml: inner.first.scale must be finite (got inf)",
+        ),
         ("name = ", "vehicle.toml: is not valid TOML"),
         ("a = " + "[" * 5000, "vehicle.toml: is not valid TOML"),
     ],
@@ -157,15 +163,19 @@ def test_unreadable_files_are_one_line(tmp_path: Path) -> None:
     count=st.integers(-(2**60), 2**60),
     time=st.floats(allow_nan=False),
     numbers=st.lists(st.integers(1, 16)),
-    first=st.none() | st.builds(Channel, number=st.integers(1, 16), scale=st.floats(allow_nan=False)),
+    first=st.none()
+    | st.builds(
+        Channel,
+        number=st.integers(1, 16),
+        scale=st.floats(allow_nan=False, allow_infinity=False),
+        speed=st.just(inf),
+    ),
 )
 def test_written_toml_reads_back_equal(
     name: str, count: int, time: float, numbers: list[int], first: Channel | None
 ) -> None:
     channels = tuple(Channel(number=number) for number in numbers)
     outer = Outer(name=name, count=count, inner=Inner(forgetting_time=time, channels=channels, first=first))
-    import tomllib
-
     table = tomllib.loads(to_toml(outer))
     assert build(Outer, table, file="x", folder=Path()) == outer
     assert build(Outer, to_table(outer), file="x", folder=Path()) == outer
