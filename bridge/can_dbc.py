@@ -77,7 +77,10 @@ class DbcDialect:
             signal.name: 0 if signal.minimum is None else max(0, signal.minimum) for signal in message.signals
         }
         try:
-            data = message.encode(values | dict(fields), strict=True)
+            values |= fields
+            # Values of other multiplexers may be among them, so not `strict`.
+            message.assert_signals_encodable(values, scaling=True, assert_all_known=False)
+            data = message.encode(values, strict=False)
         except Exception as error:  # EncodeError, OverflowError, struct.error
             raise ValueError(f"{name}: {_first_line(error)}") from error
         return [Packet(t_us=t_us, data=data, can_id=message.frame_id, extended=message.is_extended_frame)]

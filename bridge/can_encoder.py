@@ -26,7 +26,7 @@ class CanEncoder:
         for signal in can_map.table():
             name = "depth" if signal.quantity == "pressure" else signal.quantity
             self._signal_of.setdefault(Quantity(name), signal)
-        self._pending: dict[str, dict[str, float]] = {}
+        self._pending: dict[tuple[object, ...], dict[str, float]] = {}
 
     def encode(self, measurement: Measurement) -> list[Packet]:
         """The frames that this measurement completes, stamped with its time."""
@@ -34,13 +34,15 @@ class CanEncoder:
         if signal is None:
             self.counts["refused.not_mapped"] += 1
             return []
-        pending = self._pending.setdefault(signal.message, {})
-        pending[signal.signal] = self._map.from_quantity(signal, measurement.value)
-        wanted = [other for other in self._signal_of.values() if other.message == signal.message]
-        if any(other.signal not in pending for other in wanted):
+        # Pages of a multiplexed message are messages of their own.
+        page = (signal.message, signal.only)
+        fields = self._pending.setdefault(page, {})
+        fields[signal.signal] = self._map.from_quantity(signal, measurement.value)
+        together = [other for other in self._signal_of.values() if (other.message, other.only) == page]
+        if any(other.signal not in fields for other in together):
             return []
-        fields = dict(self._pending.pop(signal.message))
-        for other in wanted:
+        del self._pending[page]
+        for other in together:
             fields |= {only.signal: only.value for only in other.only}
             if other.time is not None:
                 period_us = self._dialect.clock_period_us(other.message, other.time)
