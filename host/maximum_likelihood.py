@@ -9,6 +9,7 @@ sensitivities at fixed gain, the noise levels between them by a simplex search; 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,12 +72,14 @@ def fit_maximum_likelihood(
     recordings: list[Recording],
     *,
     held: dict[int, float] | None = None,
+    noise_model: Literal["auto", "output_error", "filter_error"] = "auto",
     on_progress: Callable[[str], None] = lambda _: None,
 ) -> Fit:
     """Identifies one vehicle from its recordings, jointly; several starts, the likeliest end wins.
 
     held  values of parameters (by index in NAMES) that are not to be estimated. Where the recordings
           carry measured speed, u0 is held at its mean: speed and depth together leave it no freedom.
+    noise_model  "auto" filters where the free run's residuals are not white and the likelihood gains by it
     """
     held = dict(held) if held is not None else {}
     if recordings[0].has_speed:
@@ -91,13 +94,14 @@ def fit_maximum_likelihood(
         on_progress("output error")
         candidates.append(_output_error(_Point(parameters, initial, np.zeros(4)), inputs, free))
     best = max(candidates, key=lambda fit: fit.log_likelihood)
-    if all(is_white(e) for e in best.whitened):
+    if noise_model == "output_error" or (noise_model == "auto" and all(is_white(e) for e in best.whitened)):
         return best
     on_progress("filter error")
     filtered = _filter_error(best, inputs, free)
     samples = sum(int(i.present.sum()) for i in inputs)
     gain = filtered.log_likelihood - best.log_likelihood
-    return filtered if 2.0 * gain > 2.0 * np.log(samples) else best
+    is_better = 2.0 * gain > 2.0 * np.log(samples)
+    return filtered if is_better or noise_model == "filter_error" else best
 
 
 def _output_error(start: _Point, inputs: list[Inputs], free: Mask, most_iterations: int = 40) -> Fit:
@@ -249,8 +253,9 @@ def _constant_variance(noise: Array, rows: int) -> Array:
 def _residual_noise(parts: list[tuple[Array, Array]], inputs: list[Inputs]) -> Array:
     count = sum(one.present.sum(axis=1) for one in inputs)
     with np.errstate(over="ignore", invalid="ignore"):
-        squares = sum(np.sum(error**2, axis=1) for error, _ in parts)
-        return np.maximum(np.nan_to_num(squares / count, nan=np.inf), SMALLEST_NOISE)
+        squares = np.sum([np.sum(error**2, axis=1) for error, _ in parts], axis=0)
+        variance: Array = np.maximum(np.nan_to_num(squares / count, nan=np.inf), SMALLEST_NOISE)
+    return variance
 
 
 def _concentrated_cost(noise: Array, inputs: list[Inputs]) -> float:

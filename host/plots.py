@@ -55,7 +55,7 @@ def free_run_plot(prediction: Prediction) -> str:
         rest.plot(recording.time, measured - simulated, color=RESIDUAL, linewidth=0.6)
         rest.set_ylabel("left over")
     axes[0].invert_yaxis()
-    axes[0].legend(loc="upper right", frameon=False, ncols=2, markerscale=3)
+    axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False, ncols=2, markerscale=3)
     axes[4].step(recording.time, np.degrees(recording.rudder), where="post", color=RUDDER, linewidth=0.9)
     axes[4].set_ylabel("plane, deg")
     axes[4].set_xlabel("time, s")

@@ -6,12 +6,13 @@ trims and initial states to the measurements themselves (an output-error fit, fr
 regression on measured signals), covers all stable vehicles; the best few points start the likelihood search.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import minimize, minimize_scalar
-from scipy.signal import lfilter, ss2tf
+from scipy.signal import lfilter
 
-from host.equations import NAMES
 from host.recording import Array, Recording
 
 LARGEST_FIT = 4000  # rows used per linear fit; more only cost time
@@ -39,95 +40,108 @@ class _Stretch:
         return rows, values[present]
 
 
-def _discrete(A: Array, B: Array, h: float) -> tuple[Array, Array]:
-    """Exact zero-order hold, by the augmented matrix exponential (A may be singular)."""
-    n, m = B.shape
-    block = np.zeros((n + m, n + m))
-    block[:n, :n], block[:n, n:] = A, B
-    E = expm(block * h)
-    return E[:n, :n], E[:n, n:]
+class _SecondOrder:
+    """Exact zero-order-hold responses of x' = A x + [1, 0]^T input, output x[1], two states, one step."""
 
+    def __init__(self, A: Array, h: float, count: int) -> None:
+        block = np.zeros((3, 3))
+        block[:2, :2], block[0, 2] = A, 1.0
+        E = expm(block * h)  # the augmented exponential: A itself may be singular
+        Phi, Gamma = E[:2, :2], E[:2, 2]
+        trace = float(np.trace(Phi))
+        first, second = Gamma[1], float(Phi[1] @ Gamma)
+        self._denominator = np.array([1.0, -trace, float(np.linalg.det(Phi))])
+        self._numerator = np.array([0.0, first, second - trace * first])
+        impulse = np.zeros(count)
+        impulse[0] = 1.0
+        self.to_constant = self.to_input(np.ones(count))
+        self.to_initial = [
+            lfilter([state[1], Phi[1] @ state - trace * state[1]], self._denominator, impulse)
+            for state in np.eye(2)
+        ]
 
-def _responses(A: Array, B: Array, c: Array, h: float, drives: list[Array]) -> list[Array]:
-    """Outputs c x of x' = A x + B drive, one for each drive (1-D B), then for each unit initial state."""
-    Phi, Gamma = _discrete(A, B, h)
-    count = drives[0].size
-    columns = []
-    for drive in drives:
-        numerator, denominator = ss2tf(Phi, Gamma, c[None, :], np.zeros((1, 1)))
-        columns.append(lfilter(numerator[0], denominator, drive))
-    impulse = np.zeros(count)
-    impulse[0] = 1.0
-    for state in np.eye(A.shape[0]):
-        numerator, denominator = ss2tf(
-            Phi, (Phi @ state)[:, None], c[None, :], np.array([[float(c @ state)]])
+    def to_input(self, values: Array) -> Array:
+        return np.asarray(lfilter(self._numerator, self._denominator, values))
+
+    def table(self, stretch: _Stretch) -> Array:
+        """Columns: response to the rudder, to a constant, to each initial state; one row a grid instant."""
+        ends = slice(0, stretch.count)
+        return np.column_stack(
+            [self.to_input(stretch.rudder), self.to_constant[ends], *(r[ends] for r in self.to_initial)]
         )
-        columns.append(lfilter(numerator[0], denominator, impulse))
-    return columns
+
+
+def _tables(stretches: list[_Stretch], A: Array) -> list[Array]:
+    longest = max(s.count for s in stretches)
+    systems = {step: _SecondOrder(A, step, longest) for step in {s.step for s in stretches}}
+    return [systems[s.step].table(s) for s in stretches]
 
 
 def _joint_fit(
-    blocks: list[Array], own: list[Array], targets: list[Array]
-) -> tuple[Array, float, list[Array]]:
-    """Least squares with columns common to all stretches and columns of each stretch alone."""
-    shared = blocks[0].shape[1]
-    total = shared + sum(part.shape[1] for part in own)
-    rows = sum(target.size for target in targets)
-    table, at, column = np.zeros((rows, total)), 0, shared
-    for block, part, target in zip(blocks, own, targets, strict=True):
-        table[at : at + target.size, :shared] = block
-        table[at : at + target.size, column : column + part.shape[1]] = part
-        at, column = at + target.size, column + part.shape[1]
-    scale = np.linalg.norm(table, axis=0)
-    scale[scale == 0.0] = 1.0
-    y = np.concatenate(targets)
-    solution = np.linalg.lstsq(table / scale, y, rcond=1e-10)[0] / scale
-    own_solutions, column = [], shared
-    for part in own:
-        own_solutions.append(solution[column : column + part.shape[1]])
-        column += part.shape[1]
-    return solution, float(np.sum((y - table @ solution) ** 2)), own_solutions
+    shared: list[Array], own: list[Array], targets: list[Array]
+) -> tuple[Array, list[Array], float]:
+    """Least squares with columns common to all stretches and columns of each stretch alone, and its cost.
 
-
-def _pitch_model(stretches: list[_Stretch], a2: float, a3: float) -> tuple[Array, float, list[Array]]:
-    """Fits b2, pitch_offset and each stretch's initial [q, theta]; also the cost, and theta on the grid."""
-    A, B, c = np.array([[a2, a3], [1.0, 0.0]]), np.array([[1.0], [0.0]]), np.array([0.0, 1.0])
-    tables = [np.column_stack(_responses(A, B, c, s.step, [s.rudder, np.ones(s.count)])) for s in stretches]
-    blocks = [table[s.pitch_rows, :2] for table, s in zip(tables, stretches, strict=True)]
-    own = [table[s.pitch_rows, 2:] for table, s in zip(tables, stretches, strict=True)]
-    solution, cost, initial = _joint_fit(blocks, own, [s.pitch for s in stretches])
-    theta = [
-        table[:, :2] @ solution[:2] + table[:, 2:] @ x0 for table, x0 in zip(tables, initial, strict=True)
+    Each stretch's own columns are projected out first, so the work grows with the stretches, not their square.
+    """
+    count = shared[0].shape[1]
+    H, g = np.zeros((count, count)), np.zeros(count)
+    projected = []
+    for block, part, y in zip(shared, own, targets, strict=True):
+        Q, _ = np.linalg.qr(part)
+        B, r = block - Q @ (Q.T @ block), y - Q @ (Q.T @ y)
+        H += B.T @ B
+        g += B.T @ r
+        projected.append((B, r))
+    scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
+    solution = np.linalg.lstsq(H / np.outer(scale, scale), g / scale, rcond=1e-12)[0] / scale
+    cost = sum(float(np.sum((r - B @ solution) ** 2)) for B, r in projected)
+    initial = [
+        np.linalg.lstsq(part, y - block @ solution, rcond=1e-10)[0]
+        for block, part, y in zip(shared, own, targets, strict=True)
     ]
-    return np.concatenate([solution[:2], *initial]), cost, theta
+    return solution, initial, cost
 
 
-def _heave_model(
-    stretches: list[_Stretch], theta: list[Array], a1: float, speed: float | None
-) -> tuple[Array, float]:
-    """Fits b1, heave_offset, u0 (unless the speed is measured) and each stretch's initial [w, zeta]."""
-    A, B, c = np.array([[a1, 0.0], [1.0, 0.0]]), np.array([[1.0], [0.0]]), np.array([0.0, 1.0])
-    blocks, own, targets = [], [], []
-    for s, pitch in zip(stretches, theta, strict=True):
-        rise = np.concatenate([[0.0], np.cumsum(0.5 * (pitch[1:] + pitch[:-1])) * s.step])
-        table = np.column_stack(_responses(A, B, c, s.step, [s.rudder, np.ones(s.count)]))
-        target = s.depth
-        if s.speed is None:
-            block = np.column_stack([table[:, :2], -rise])
-        else:
-            product = s.speed * pitch
-            climb = np.concatenate([[0.0], np.cumsum(0.5 * (product[1:] + product[:-1])) * s.step])
-            block, target = table[:, :2], target + climb[s.depth_rows]
-        blocks.append(block[s.depth_rows])
-        own.append(table[s.depth_rows, 2:])
-        targets.append(target)
-    solution, cost, initial = _joint_fit(blocks, own, targets)
-    u0 = solution[2] if speed is None else speed
-    return np.concatenate([solution[:2], [u0], *initial]), cost
+@dataclass(frozen=True, slots=True)
+class _Fitted:
+    """Gains, initial states of each stretch, cost, and the output on every grid instant of each stretch."""
+
+    gains: Array
+    initial: list[Array]
+    cost: float
+    output: list[Array]
+
+
+def _pitch_model(stretches: list[_Stretch], a2: float, a3: float) -> _Fitted:
+    """Fits b2, pitch_offset and the initial [q, theta]."""
+    tables = _tables(stretches, np.array([[a2, a3], [1.0, 0.0]]))
+    gains, initial, cost = _joint_fit(
+        [table[s.pitch_rows, :2] for table, s in zip(tables, stretches, strict=True)],
+        [table[s.pitch_rows, 2:] for table, s in zip(tables, stretches, strict=True)],
+        [s.pitch for s in stretches],
+    )
+    theta = [table[:, :2] @ gains + table[:, 2:] @ x0 for table, x0 in zip(tables, initial, strict=True)]
+    return _Fitted(gains, initial, cost, theta)
+
+
+def _heave_model(stretches: list[_Stretch], theta: list[Array], a1: float) -> _Fitted:
+    """Fits b1, heave_offset, u0 (unless the speed is measured) and the initial [w, zeta], for given pitch."""
+    tables = _tables(stretches, np.array([[a1, 0.0], [1.0, 0.0]]))
+    shared, targets = [], []
+    for table, s, pitch in zip(tables, stretches, theta, strict=True):
+        climb = pitch if s.speed is None else s.speed * pitch
+        risen = np.concatenate([[0.0], np.cumsum(0.5 * (climb[1:] + climb[:-1])) * s.step])
+        columns = table[:, :2] if s.speed is not None else np.column_stack([table[:, :2], -risen])
+        shared.append(columns[s.depth_rows])
+        targets.append(s.depth if s.speed is None else s.depth + risen[s.depth_rows])
+    own = [table[s.depth_rows, 2:] for table, s in zip(tables, stretches, strict=True)]
+    gains, initial, cost = _joint_fit(shared, own, targets)
+    return _Fitted(gains, initial, cost, [])
 
 
 def start_values(recordings: list[Recording]) -> list[tuple[Array, list[Array]]]:
-    """Start points for the likelihood search, best first: one, or two where the grid has two valleys.
+    """Start points for the likelihood search, best first: one, or more where the grid has several valleys.
 
     Each is (parameters (8,) in the order of host.equations.NAMES, initial states (4,) of each recording).
     """
@@ -139,19 +153,18 @@ def start_values(recordings: list[Recording]) -> list[tuple[Array, list[Array]]]
     best = []
     for frequency, damping in _pitch_valleys(stretches, slowest, fastest):
         a2, a3 = -2.0 * damping * frequency, -(frequency**2)
-        pitch, _, theta = _pitch_model(stretches, a2, a3)
-        a1 = _heave_valley(stretches, theta, speed, 0.3 * slowest, fastest)
-        heave, _ = _heave_model(stretches, theta, a1, speed)
-        parameters = dict(
-            a1=a1, a2=a2, a3=a3, b1=heave[0], b2=pitch[0], u0=heave[2],
-            heave_offset=heave[1], pitch_offset=pitch[1],
-        )  # fmt: skip
-        initial = [
-            np.array([heave[3 + 2 * i], pitch[2 + 2 * i], pitch[3 + 2 * i], heave[4 + 2 * i]])
-            for i in range(len(recordings))
-        ]
-        best.append((np.array([parameters[name] for name in NAMES]), initial))
-    return best
+        pitch = _pitch_model(stretches, a2, a3)
+        for a1 in _heave_valleys(stretches, pitch.output, 0.3 * slowest, fastest):
+            heave = _heave_model(stretches, pitch.output, a1)
+            u0 = heave.gains[2] if speed is None else speed
+            gains = [a1, a2, a3, heave.gains[0], pitch.gains[0], u0, heave.gains[1], pitch.gains[1]]
+            initial = [
+                np.array([w, q, theta, zeta])
+                for (w, zeta), (q, theta) in zip(heave.initial, pitch.initial, strict=True)
+            ]
+            best.append((heave.cost, np.array(gains), initial))
+    best.sort(key=lambda start: start[0])
+    return [(parameters, initial) for _, parameters, initial in best]
 
 
 def _pitch_valleys(stretches: list[_Stretch], slowest: float, fastest: float) -> list[tuple[float, float]]:
@@ -159,7 +172,7 @@ def _pitch_valleys(stretches: list[_Stretch], slowest: float, fastest: float) ->
 
     def cost(log_point: Array) -> float:
         frequency, damping = np.exp(np.clip(log_point, -12.0, 6.0))
-        return _pitch_model(stretches, -2.0 * damping * frequency, -(frequency**2))[1]
+        return _pitch_model(stretches, -2.0 * damping * frequency, -(frequency**2)).cost
 
     grid = [
         np.log([frequency, damping])
@@ -177,15 +190,22 @@ def _pitch_valleys(stretches: list[_Stretch], slowest: float, fastest: float) ->
     return [(float(np.exp(point[0])), float(np.exp(point[1]))) for point in near_best]
 
 
-def _heave_valley(
-    stretches: list[_Stretch], theta: list[Array], speed: float | None, slowest: float, fastest: float
-) -> float:
-    """The heave damping a1 of the best depth model for the given pitch, refined between grid points."""
+def _heave_valleys(
+    stretches: list[_Stretch], theta: list[Array], slowest: float, fastest: float
+) -> list[float]:
+    """Heave damping a1 of the best depth model for the given pitch; two where two explain almost alike."""
 
     def cost(log_rate: float) -> float:
-        return _heave_model(stretches, theta, -np.exp(log_rate), speed)[1]
+        return _heave_model(stretches, theta, -np.exp(log_rate)).cost
 
     grid = np.linspace(np.log(slowest), np.log(fastest), 16)
-    at = int(np.argmin([cost(rate) for rate in grid]))
-    bracket = (grid[max(at - 1, 0)], grid[min(at + 1, 15)])
-    return -float(np.exp(minimize_scalar(cost, bounds=bracket, method="bounded", options=dict(xatol=0.02)).x))
+    costs = np.array([cost(rate) for rate in grid])
+    padded = np.concatenate([[np.inf], costs, [np.inf]])
+    valleys = np.flatnonzero((costs <= padded[:-2]) & (costs <= padded[2:]))
+    found = []
+    for at in valleys[np.argsort(costs[valleys])][:2]:
+        bracket = (grid[max(at - 1, 0)], grid[min(at + 1, 15)])
+        refined = minimize_scalar(cost, bounds=bracket, method="bounded", options=dict(xatol=0.02))
+        found.append((float(refined.fun), -float(np.exp(refined.x))))
+    found.sort()
+    return [a1 for value, a1 in found if value < 1.5 * found[0][0]]

@@ -29,7 +29,7 @@ def covariance(fit: Fit) -> Array:
 
 def _safe_inverse(M: Array) -> Array:
     """Inverse by scaled eigenvectors; directions without information get a huge but finite variance."""
-    scale = np.sqrt(np.maximum(np.diag(M), 1e-300))
+    scale = np.sqrt(np.maximum(np.diag(M), 1e-100))
     values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
     values = np.maximum(values, 1e-14)
     return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))

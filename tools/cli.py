@@ -1,10 +1,15 @@
 """The `mils` command: one module of tools.commands for each sub-command."""
 
 import argparse
+import os
 import signal
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+
+os.environ.setdefault(
+    "OPENBLAS_NUM_THREADS", "1"
+)  # matrices here are tiny: threads only get in each other's way
 
 from bridge.errors import BridgeError
 from host.errors import HostError

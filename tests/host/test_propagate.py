@@ -1,0 +1,79 @@
+import numpy as np
+from exact_dive import TABLE_1, Dive, fly
+from scipy.stats import multivariate_normal
+
+from host.propagate import NP, free_run, innovations, inputs_of, kalman_pass
+
+TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
+
+
+def test_free_run_equals_the_matrix_exponential() -> None:
+    recording, states = fly(Dive(duration=60.0))
+    simulated = free_run(TRUTH, states[:, 0], inputs_of(recording))
+    assert np.abs(simulated - states).max() < 2e-6
+
+
+def test_free_run_stays_exact_when_the_speed_varies() -> None:
+    speed = np.repeat([2.5, 1.5, 2.0, 3.0], 100)
+    recording, states = fly(Dive(duration=40.0, speed=speed))
+    simulated = free_run(TRUTH, states[:, 0], inputs_of(recording))
+    assert np.abs(simulated - states).max() < 2e-6
+
+
+def test_sensitivities_equal_finite_differences() -> None:
+    recording, states = fly(Dive(duration=30.0))
+    inputs = inputs_of(recording)
+    _, sensitivity = innovations(TRUTH, states[:, 0], inputs)
+    for index in range(NP + 4):
+        change = np.zeros(NP + 4)
+        change[index] = 1e-6
+        moved = [
+            free_run(TRUTH + s * change[:NP], states[:, 0] + s * change[NP:], inputs)[2:] for s in (1.0, -1.0)
+        ]
+        slope = (moved[0] - moved[1]) / 2e-6
+        assert np.allclose(sensitivity[:, index], slope, atol=1e-6 * max(1.0, np.abs(slope).max()))
+
+
+def test_kalman_filter_without_process_noise_is_the_free_run() -> None:
+    recording, states = fly(Dive(duration=30.0, missing=0.3))
+    inputs = inputs_of(recording)
+    run = kalman_pass(TRUTH, states[:, 0], np.array([3e-6, 1e-4, 0.0, 0.0]), inputs)
+    error, _ = innovations(TRUTH, states[:, 0], inputs)
+    assert np.allclose(run.error, error, atol=1e-12)
+    assert np.allclose(run.gains, 0.0)
+
+
+def test_kalman_likelihood_equals_the_dense_gaussian() -> None:
+    """The filter's product of innovations must be the joint density of all measurements."""
+    recording, states = fly(Dive(duration=1.2, force_density=(0.02, 0.05)))
+    inputs = inputs_of(recording)
+    noise = np.array([3e-6, 1e-4, 0.02, 0.05])
+    run = kalman_pass(TRUTH, states[:, 0], noise, inputs)
+    rows = recording.time.size
+    filtered = 0.0
+    for k in range(rows):
+        S = np.array([[run.variance[0, k], run.variance[1, k]], [run.variance[1, k], run.variance[2, k]]])
+        filtered += multivariate_normal.logpdf(run.error[:, k], cov=S)
+    mean = free_run(TRUTH, states[:, 0], inputs)[2:]
+    A = _transition_by_differences(inputs)
+    Q = np.diag([noise[2], noise[3], 0.0, 0.0]) * recording.step
+    step_noise = A @ (Q / 2) @ A.T + Q / 2
+    joint = np.zeros((2 * rows, 2 * rows))
+    P = np.zeros((4, 4))
+    covariances = []
+    for _ in range(rows):
+        covariances.append(P)
+        P = A @ P @ A.T + step_noise
+    for i in range(rows):
+        for j in range(i, rows):
+            block = (np.linalg.matrix_power(A, j - i) @ covariances[i])[2:, 2:]
+            joint[2 * j : 2 * j + 2, 2 * i : 2 * i + 2] = block
+            joint[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] = block.T
+    joint += np.diag(np.tile(noise[:2], rows))
+    dense = multivariate_normal.logpdf(inputs.measured.T.ravel(), mean.T.ravel(), joint)
+    assert abs(dense - filtered) < 1e-6 * abs(dense)
+
+
+def _transition_by_differences(inputs):  # type: ignore[no-untyped-def]
+    base = free_run(TRUTH, np.zeros(4), inputs)[:, 1]
+    return np.column_stack([free_run(TRUTH, unit, inputs)[:, 1] - base for unit in np.eye(4)])

@@ -1,0 +1,49 @@
+import numpy as np
+from exact_dive import TABLE_1, Dive, fly
+from scipy.signal import lfilter
+
+from host.maximum_likelihood import fit_maximum_likelihood
+from host.uncertainty import covariance
+from host.whiteness import autocovariance, is_white
+
+
+def test_white_noise_is_white_and_filtered_noise_is_not() -> None:
+    rng = np.random.default_rng(1)
+    white = rng.standard_normal((2, 2000))
+    assert is_white(white)
+    assert not is_white(np.asarray(lfilter([1.0], [1.0, -0.3], white)))
+
+
+def test_gaps_do_not_colour_white_noise() -> None:
+    rng = np.random.default_rng(2)
+    rejected = 0
+    for _ in range(50):
+        white = rng.standard_normal((2, 2000))
+        white[rng.random(white.shape) < 0.5] = np.nan
+        rejected += not is_white(white)
+    assert rejected <= 2
+
+
+def test_autocovariance_equals_its_definition() -> None:
+    values = np.array([1.0, -2.0, np.nan, 0.5, 3.0])
+    covariance_, pairs = autocovariance(values, 2)
+    x = values - np.nanmean(values)
+    assert pairs.tolist() == [4.0, 2.0, 1.0]
+    expected = [np.nanmean(x**2), (x[0] * x[1] + x[3] * x[4]) / 2.0, x[1] * x[3]]
+    assert np.allclose(covariance_, expected)
+
+
+def test_coloured_sensor_noise_widens_the_deviations() -> None:
+    """Depth noise with a correlation time of a second: white-noise deviations would claim too much."""
+    recording, states = fly(Dive(duration=200.0, depth_noise=0.0))
+    rng = np.random.default_rng(3)
+    coloured = lfilter([np.sqrt(1 - 0.9**2)], [1.0, -0.9], rng.standard_normal(recording.time.size)) * 0.03
+    recording.depth[:] = states[3] + coloured
+    fit = fit_maximum_likelihood([recording], noise_model="output_error")
+    free = fit.free
+    naive = np.linalg.inv(fit.information[np.ix_(free, free)])
+    assert np.isfinite(covariance(fit)).all()
+    std = np.sqrt(np.diag(covariance(fit)))[free]
+    error = np.abs(fit.parameters[:6] - np.array(list(TABLE_1.values())))
+    assert (error < 4.0 * std[:6]).all()
+    assert std[0] > 1.5 * np.sqrt(naive[0, 0])
