@@ -61,7 +61,8 @@ def test_new_value_within_the_hold_is_kept() -> None:
 
 
 @pytest.mark.parametrize(
-    ("hpa", "cause"), [(nan, "non_finite"), (inf, "non_finite"), (0.0, "range"), (-5.0, "range"), (1e9, "range")]
+    ("hpa", "cause"),
+    [(nan, "non_finite"), (inf, "non_finite"), (0.0, "range"), (-5.0, "range"), (1e9, "range")],
 )
 def test_nonsense_pressure_is_refused_by_cause(hpa: float, cause: str) -> None:
     depth, counts, _ = channel()

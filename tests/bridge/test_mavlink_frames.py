@@ -1,6 +1,7 @@
 """Framing: intact frames are found whatever surrounds them, and damage is counted once."""
 
 from collections import Counter
+from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
@@ -39,7 +40,7 @@ def test_any_split_after_garbage_gives_the_same_frames(cuts: list[int], garbage:
     # Frames enough to complete whatever the garbage seems to begin.
     raw = garbage + b"".join(vehicle.attitude(1000 + k) for k in range(80))
     edges = [0, *sorted(cuts), len(raw)]
-    split, _ = frames_in(*(raw[a:b] for a, b in zip(edges, edges[1:], strict=False)))
+    split, _ = frames_in(*(raw[a:b] for a, b in pairwise(edges)))
     whole, _ = frames_in(raw)
     assert split == whole
     assert len(whole) >= 80

@@ -8,7 +8,8 @@ from bridge.vehicle_clock import VehicleClock
 S = 1_000_000
 
 
-def running(until_s: float, *, step_s: float = 0.1, delay_s: float = 0.02, start_s: float = 0.0) -> VehicleClock:
+def running(until_s: float, *, delay_s: float = 0.02, start_s: float = 0.0) -> VehicleClock:
+    step_s = 0.1
     clock = VehicleClock()
     for k in range(round((until_s - start_s) / step_s) + 1):
         boot_us = round((start_s + k * step_s) * S)

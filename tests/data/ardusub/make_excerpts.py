@@ -1,7 +1,7 @@
 """Cuts the excerpts beside this file out of whole recordings: `python make_excerpts.py FOLDER`.
 
-FOLDER holds small.tlog, small.BIN, 2023-04-18_11-03-34.tlog (ardusub_log_tools) and sub_6dof_gentle.tlog, .BIN,
-.csv. The real ones are cut by length, so that damage stays as it was; the dive by time and message.
+FOLDER holds small.tlog, small.BIN, 2023-04-18_11-03-34.tlog (ardusub_log_tools) and sub_6dof_gentle.tlog,
+.BIN, .csv. The real ones are cut by length, so that damage stays as it was; the dive by time and message.
 """
 
 import csv
@@ -51,7 +51,7 @@ def cut_dive_bin(source: Path, target: Path) -> None:
 
 
 def cut_truth(source: Path, target: Path) -> None:
-    """The simulator's depth and pitch at the rows where they are new; elsewhere the .csv holds the old ones."""
+    """The simulator's depth and pitch at the rows where they are new; elsewhere the .csv repeats them."""
     before = None
     with source.open() as rows, target.open("w") as out:
         out.write("time_boot_s,depth_m,pitch_rad\n")
@@ -65,7 +65,8 @@ def cut_truth(source: Path, target: Path) -> None:
 
 def main() -> None:
     folder = Path(sys.argv[1])
-    for name, length in (("small.tlog", 150_000), ("small.BIN", 120_000), ("2023-04-18_11-03-34.tlog", 200_000)):
+    lengths = {"small.tlog": 150_000, "small.BIN": 120_000, "2023-04-18_11-03-34.tlog": 200_000}
+    for name, length in lengths.items():
         (HERE / name).write_bytes((folder / name).read_bytes()[:length])
     cut_dive_tlog(folder / "sub_6dof_gentle.tlog", HERE / "dive.tlog")
     cut_dive_bin(folder / "sub_6dof_gentle.BIN", HERE / "dive.BIN")
