@@ -82,7 +82,7 @@ def _joint_fit(
 ) -> tuple[Array, list[Array], float]:
     """Least squares with columns common to all stretches and columns of each stretch alone, and its cost.
 
-    Each stretch's own columns are projected out first, so the work grows with the stretches, not their square.
+    Each stretch's own columns are projected out first, so the work is linear in the stretches.
     """
     count = shared[0].shape[1]
     H, g = np.zeros((count, count)), np.zeros(count)

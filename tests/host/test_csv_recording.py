@@ -1,0 +1,107 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from host.csv_map import CsvColumn, CsvMap
+from host.csv_recording import read_csv_recording
+from host.errors import RecordingError
+
+HEADER = "time_s,depth_m,pitch_rad,rudder_rad"
+
+
+def write(path: Path, rows: list[str], header: str = HEADER) -> Path:
+    path.write_text("\n".join([header, *rows]) + "\n")
+    return path
+
+
+def rows(count: int, step: float = 0.1, start: float = 0.0) -> list[str]:
+    return [f"{start + k * step:.3f},{10 + 0.01 * k:.4f},{0.001 * k:.4f},0.1" for k in range(count)]
+
+
+def test_plain_recording_is_read_as_it_is(tmp_path: Path) -> None:
+    (recording,) = read_csv_recording(write(tmp_path / "a.csv", rows(50)), CsvMap())
+    assert recording.step == pytest.approx(0.1)
+    assert recording.depth[3] == pytest.approx(10.03)
+    assert recording.pitch[3] == pytest.approx(0.003)
+    assert not recording.has_speed
+    assert len(recording.sha256) == 64
+
+
+def test_units_signs_and_scales_are_applied(tmp_path: Path) -> None:
+    lines = [f"{100 * k};{-1000 - k};{k};{1500 + k}" for k in range(20)]
+    path = write(tmp_path / "a.csv", [line.replace(";", ",") for line in lines], "ms,alt_cm,pitch_deg,servo")
+    columns = CsvMap(
+        time=CsvColumn(column="ms", unit="ms"),
+        depth=CsvColumn(column="alt_cm", unit="cm", sign=-1),
+        pitch=CsvColumn(column="pitch_deg", unit="deg"),
+        rudder=CsvColumn(column="servo", unit="raw", scale=0.001, offset=-1.5),
+    )
+    (recording,) = read_csv_recording(path, columns)
+    assert recording.time[1] == pytest.approx(0.1)
+    assert recording.depth[1] == pytest.approx(10.01)
+    assert recording.pitch[1] == pytest.approx(np.deg2rad(1.0))
+    assert recording.rudder[1] == pytest.approx(0.001)
+
+
+def test_gaps_stay_gaps_and_long_ones_cut(tmp_path: Path) -> None:
+    lines = [*rows(30), *rows(30, start=60.0)]
+    lines[5] = "0.500,,nan,0.1"
+    pieces = read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
+    assert [piece.time.size for piece in pieces] == [30, 30]
+    assert np.isnan(pieces[0].depth[5])
+    assert np.isnan(pieces[0].pitch[5])
+    assert pieces[1].time[0] == pytest.approx(60.0)
+
+
+def test_rudder_lost_for_a_moment_is_held_and_for_long_cuts(tmp_path: Path) -> None:
+    lines = rows(60)
+    for k in (10, 11):
+        lines[k] = f"{0.1 * k:.3f},10.0,0.0,"
+    for k in range(30, 50):
+        lines[k] = f"{0.1 * k:.3f},10.0,0.0,"
+    pieces = read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
+    assert [piece.time.size for piece in pieces] == [40, 10]
+    assert np.isfinite(pieces[0].rudder).all()
+
+
+def test_time_running_backwards_and_repeated_is_dropped_and_counted(tmp_path: Path) -> None:
+    lines = rows(30)
+    lines.insert(10, "0.2,99,9,9")
+    lines.insert(20, lines[19])
+    lines.insert(5, "x,1,1,1")
+    (recording,) = read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
+    assert recording.time.size == 30
+    assert recording.depth.max() < 11
+    assert recording.counts["refused.time_not_advancing"] == 2
+    assert recording.counts["refused.time_missing"] == 1
+
+
+def test_speed_with_holes_is_bridged_and_mostly_missing_is_no_speed(tmp_path: Path) -> None:
+    lines = [f"{line},{'' if k % 3 == 0 else 2.0}" for k, line in enumerate(rows(30))]
+    (recording,) = read_csv_recording(write(tmp_path / "a.csv", lines, HEADER + ",speed_mps"), CsvMap())
+    assert recording.has_speed
+    assert np.allclose(recording.speed, 2.0)
+    lines = [f"{line},{2.0 if k % 3 == 0 else ''}" for k, line in enumerate(rows(30))]
+    (recording,) = read_csv_recording(write(tmp_path / "b.csv", lines, HEADER + ",speed_mps"), CsvMap())
+    assert not recording.has_speed
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "is empty"),
+        (b"\x00\xff\xfe\x80garbage" * 50, "is not a text table"),
+        (b"time_s,depth_m,pitch_rad\n0,1,2\n", "column 'rudder_rad' for rudder is not in the file"),
+        (HEADER.encode() + b"\n0,1,0,0\n", "only 1 rows"),
+        (HEADER.encode() + b"\n" + b"\n".join(b"%d,,,0" % k for k in range(20)), "no stretch of 10 rows"),
+        (HEADER.encode() + b"\n" + b"\n".join(b"a,b,c,d" for _ in range(20)), "only 0 rows"),
+    ],
+)
+def test_bad_file_says_what_is_wrong_in_one_line(tmp_path: Path, content: bytes, message: str) -> None:
+    path = tmp_path / "bad.csv"
+    path.write_bytes(content)
+    with pytest.raises(RecordingError) as caught:
+        read_csv_recording(path, CsvMap())
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
