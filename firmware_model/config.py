@@ -19,7 +19,7 @@ class EstimatorConfig:
     covariance_cap: float | None = None  # largest P_ii that forgetting may lead to; None for p0
     excitation_threshold: float = 0.005  # rad; below it both rudder and pitch are at rest. 0 learns always
     excitation_time: float = 5.0  # s, averaging time of the excitation
-    # Standard deviations of the innovation; None or inf refuses none. A sampled rudder step alone reaches ten:
+    # Standard deviations of the innovation; None or inf refuses none. A sampled rudder step can reach ten:
     # a narrower gate refuses the very samples that tell most.
     outlier_gate: float | None = 20.0
     outlier_limit: int = 5  # outliers in a row that are refused before they are believed, at least 1

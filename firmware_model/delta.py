@@ -1,9 +1,9 @@
 """The depth channel's row in scaled delta coordinates.
 
 Four consecutive depths are almost equal, so the paper's coordinates leave the information matrix with a
-condition number near 5e11, and a prior of 1e-6 on the coefficients then outweighs the data: without noise
-the heave damping comes out five times too large. In backward differences, near SI units by powers of two, the
-same model reads
+condition number of 1e10 to 1e12, and a prior of 1e-6 on the coefficients then outweighs the data: with little
+noise the heave damping comes out several times too large. In backward differences, near SI units by powers
+of two, the same model reads
 
     zeta(k) - zeta(k-1) = t1 (zeta(k-1) - ref) + t2 D1 zeta(k-1) + t3 D2 zeta(k-1) + t4 D3 zeta(k-1)
                         + t5 delta(k-2) + t6 D1 delta(k-2) + t7 D2 delta(k-2)          Di = s^i (1 - z^-1)^i
@@ -44,7 +44,7 @@ class DeltaCoordinates:
         self._offset[0] = -1.0
 
     def transform(self, phi: Sequence[float]) -> None:
-        """Writes the delta row of the paper's phi = [-zeta(k-1) ... -zeta(k-4), delta(k-2) ... delta(k-4)]."""
+        """Writes the delta row of the paper's phi = [-zeta(k-1) ..., delta(k-2) ...]."""
         row = self.row
         for i in range(DEPTHS):
             row[i] = -phi[i]

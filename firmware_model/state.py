@@ -20,7 +20,7 @@ def count_of(state: Mapping[str, Any], key: str) -> int:
 
 
 def finite_numbers(state: Mapping[str, Any], key: str, size: int | None) -> list[float]:
-    """The list of `size` finite numbers (None: any number) under `key`. Raises ValueError if it is not one."""
+    """The `size` finite numbers (None: any number) under `key`. Raises ValueError if they are not there."""
     values = state.get(key)
     if not isinstance(values, list):
         raise ValueError(f"state.{key} must be a list (got {values})")

@@ -17,7 +17,7 @@ class UdReference:
         self.window = []
 
     def update(self, phi, y):
-        self.window = ([(np.array(phi, dtype=float), float(y))] + self.window)[: self.p]
+        self.window = [(np.array(phi, dtype=float), float(y)), *self.window][: self.p]
         for row, output in self.window:
             self._scalar_update(row, output)
         self.D = self.D / self.forgetting
