@@ -8,6 +8,7 @@ import struct
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -15,8 +16,11 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from bridge.errors import LinkError
 from bridge.measurement import Quantity
+from firmware_model.config import EstimatorConfig
+from firmware_model.vertical_plane import VerticalPlaneEstimator
 from host.errors import ConfigError, HostError
 from host.journal import read_journal
+from host.live import Progress
 from tools.commands import run as command
 
 ROOT = Path(__file__).parents[2]
@@ -24,6 +28,8 @@ H = 0.1
 VEHICLE = """
 name = "test"
 speed = 2.0
+[journal]
+folder = "journals"
 [mavlink]
 depth_source = "SCALED_PRESSURE2"
 surface_pressure_hpa = 1013.25
@@ -31,7 +37,7 @@ rudder = [{ channel = 1, rad_per_us = 0.001 }]
 """
 
 
-def frames(steps: int, rudder: bool = True) -> list[bytes]:
+def frames(steps: int, rudder: bool = True) -> list[list[bytes]]:
     """What an autopilot with the linear vehicle behind it sends, ten times a second."""
     mav = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
     w = q = theta = 0.0
@@ -49,7 +55,7 @@ def frames(steps: int, rudder: bool = True) -> list[bytes]:
             messages.append(mav.servo_output_raw_encode(1000 * ms, 0, pulse, *[0] * 7))
         if k % 10 == 0:
             messages.insert(0, mav.heartbeat_encode(dialect.MAV_TYPE_SUBMARINE, 3, 0, 0, 4))
-        out.append(b"".join(message.pack(mav) for message in messages))
+        out.append([bytes(message.pack(mav)) for message in messages])
         w, q, theta, depth = (
             w + H * (-0.6 * w + 0.4 * delta),
             q + H * (-3.4 * q - 8.2 * theta - 3.9 * delta),
@@ -59,14 +65,17 @@ def frames(steps: int, rudder: bool = True) -> list[bytes]:
     return out
 
 
-def write_tlog(path: Path, packets: list[bytes]) -> None:
-    with path.open("wb") as file:
-        for k, packet in enumerate(packets):
-            for frame in re.findall(rb"\xfd.*?(?=\xfd\d|\Z)", packet, re.DOTALL) or [packet]:
-                file.write(struct.pack(">Q", 1_700_000_000_000_000 + 100_000 * k) + frame)
+def write_tlog(path: Path, instants: list[list[bytes]]) -> None:
+    stamp = 1_700_000_000_000_000
+    records = (
+        struct.pack(">Q", stamp + 100_000 * k) + frame
+        for k, instant in enumerate(instants)
+        for frame in instant
+    )
+    path.write_bytes(b"".join(records))
 
 
-@pytest.fixture()
+@pytest.fixture
 def vehicle(tmp_path: Path) -> Path:
     path = tmp_path / "vehicle.toml"
     path.write_text(VEHICLE)
@@ -80,13 +89,12 @@ def parse(*arguments: object) -> argparse.Namespace:
 
 
 def test_a_log_is_run_like_a_link(tmp_path: Path, vehicle: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    packets = frames(600)
     log = tmp_path / "dive.tlog"
-    with log.open("wb") as file:
-        for k, packet in enumerate(packets):
-            file.write(struct.pack(">Q", 1_700_000_000_000_000 + 100_000 * k) + packet)
+    write_tlog(log, frames(600))
     journal = tmp_path / "out" / "dive.jsonl"
-    code = command.run(parse(vehicle, "--link", f"log:{log}", "--speed", "inf", "--journal", journal, "--no-state"))
+    code = command.run(
+        parse(vehicle, "--link", f"log:{log}", "--speed", "inf", "--journal", journal, "--no-state")
+    )
     captured = capsys.readouterr()
     assert code == 0
     assert f"journal: {journal}" in captured.out
@@ -100,7 +108,7 @@ def test_a_quantity_that_never_came_is_named_with_what_to_check(
     tmp_path: Path, vehicle: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = tmp_path / "dive.tlog"
-    log.write_bytes(b"".join(struct.pack(">Q", 1_700_000_000_000_000) + p for p in frames(50, rudder=False)))
+    write_tlog(log, frames(50, rudder=False))
     code = command.run(parse(vehicle, "--link", f"log:{log}", "--speed", "inf", "--journal", tmp_path))
     error = capsys.readouterr().err
     assert code == 1
@@ -175,8 +183,8 @@ def test_a_signal_ends_a_live_run_with_everything_kept(tmp_path: Path, vehicle: 
     answers = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle_socket:
         vehicle_socket.setblocking(False)
-        for packet in frames(200):
-            vehicle_socket.sendto(packet, ("127.0.0.1", port))
+        for instant in frames(200):
+            vehicle_socket.sendto(b"".join(instant), ("127.0.0.1", port))
             time.sleep(0.002)
         while len(read_journal(journal).measurements) < 790 and time.monotonic() < deadline:
             time.sleep(0.02)
@@ -184,7 +192,7 @@ def test_a_signal_ends_a_live_run_with_everything_kept(tmp_path: Path, vehicle: 
         out, err = process.communicate(timeout=10)
         for _ in range(1000):
             try:
-                answers.append(vehicle_socket.recv(300))
+                answers.append(vehicle_socket.recv(65535))
             except BlockingIOError:
                 break
     assert process.returncode == 0, err
@@ -194,14 +202,53 @@ def test_a_signal_ends_a_live_run_with_everything_kept(tmp_path: Path, vehicle: 
     counts = {quantity: sum(m.quantity is quantity for m in measurements) for quantity in Quantity}
     assert counts[Quantity.PITCH] == counts[Quantity.RUDDER] == 200
     assert counts[Quantity.DEPTH] >= 190
-    assert (ROOT / "journals" / "test.state.json").exists() is False
-    # Estimates and heartbeats came back to the vehicle.
+    assert (tmp_path / "journals" / "test.state.json").exists()
+    # The vehicle was asked for its rates and given the estimates.
     mav = dialect.MAVLink(None)
     names = {m.get_type() for answer in answers for m in mav.parse_buffer(answer) or []}
-    assert {"HEARTBEAT", "NAMED_VALUE_FLOAT"} <= names
+    assert {"COMMAND_LONG", "NAMED_VALUE_FLOAT"} <= names
 
 
-def test_progress_is_one_line_every_ten_seconds_on_a_pipe(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    from dataclasses import replace
+def progress(seconds: float) -> Progress:
+    estimate = VerticalPlaneEstimator(EstimatorConfig(step=0.1, speed=2.0)).estimate()
+    return Progress(
+        seconds=seconds,
+        measurements=Counter(),
+        samples=Counter(UPDATED=7),
+        refused=Counter(crc=2),
+        estimate=estimate,
+        never_heard=(),
+        lost_lines=0,
+    )
 
-    from host.live import LiveLoop  # noqa: F401
+
+def test_progress_on_a_pipe_is_a_line_every_ten_seconds(capsys: pytest.CaptureFixture[str]) -> None:
+    display = command._Display(is_quiet=False)
+    for second in range(1, 31):
+        display.show(progress(second))
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.split()[0] for line in lines] == ["1", "11", "21"]
+    assert "7 samples, 2 refused" in lines[0]
+
+
+def test_progress_on_a_terminal_is_one_line_rewritten(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "60")
+    display = command._Display(is_quiet=False)
+    display.show(progress(1))
+    display.say("link lost")
+    display.show(progress(2))
+    display.finish()
+    error = capsys.readouterr().err
+    assert error.count("\n") == 2
+    assert error.count("\r\x1b[K") == 3
+    assert all(len(line) < 60 for line in re.split(r"\r\x1b\[K|\n", error))
+
+
+def test_quiet_silences_progress_and_not_what_went_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+    display = command._Display(is_quiet=True)
+    display.show(progress(1))
+    display.say("link lost")
+    assert capsys.readouterr().err == "link lost\n"
