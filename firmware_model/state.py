@@ -1,6 +1,6 @@
 """Checks shared by constructors and by saved states: the message holds name, rule and value."""
 
-import math
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -27,5 +27,7 @@ def finite_numbers(state: Mapping[str, Any], key: str, size: int | None) -> list
     require(size is None or len(values) == size, f"state.{key} must hold {size} numbers", len(values))
     for value in values:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        require(is_number and math.isfinite(value), f"state.{key} must hold finite numbers", value)
+        require(
+            is_number and abs(value) <= sys.float_info.max, f"state.{key} must hold finite numbers", value
+        )
     return [float(value) for value in values]

@@ -102,9 +102,8 @@ def main() -> None:
                 symmetrised = textbook_life(rows, p, forgetting, real, symmetric=True)
                 scalar = float if real is np.float64 else real
                 root = square_root_life(rows, outputs, p, forgetting, scalar)
-                print(
-                    f" {real.__name__:9s} {forgetting:9.3f} {p:3d} {textbook:10d} {symmetrised:12d} {root:12d}"
-                )
+                case = f" {real.__name__:9s} {forgetting:9.3f} {p:3d}"
+                print(f"{case} {textbook:10d} {symmetrised:12d} {root:12d}")
 
 
 if __name__ == "__main__":

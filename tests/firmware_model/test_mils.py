@@ -259,6 +259,7 @@ def test_state_goes_through_json_and_goes_on_with_the_same_bits():
         ("theta", [0.0, 0.0]),
         ("theta", [0.0, 0.0, math.nan]),
         ("theta", [0.0, 0.0, "0"]),
+        ("theta", [0, 0, 10**400]),
         ("root", [0.0] * 9),
         ("root", None),
         ("rows", [0.0]),
