@@ -44,9 +44,9 @@ def test_missing_extras_devices_and_compiler_do_no_harm(
         raise OSError(97, "Address family not supported by protocol")
 
     monkeypatch.setattr(doctor, "BENCH", ("no_such_module",))
-    monkeypatch.setattr(doctor.shutil, "which", lambda _: None)
+    monkeypatch.setattr("tools.commands.doctor.shutil.which", lambda _: None)
     monkeypatch.setattr("serial.tools.list_ports.comports", list)
-    monkeypatch.setattr(doctor.socket, "socket", no_can)
+    monkeypatch.setattr("tools.commands.doctor.socket.socket", no_can)
     assert diagnose() == 0
     output = capsys.readouterr().out
     for name, remedy in [
@@ -68,11 +68,11 @@ def test_an_old_python_a_locked_device_and_a_clock_of_1970_are_told(monkeypatch:
     monkeypatch.setattr(doctor, "OLDEST_PYTHON", (99, 0))
     assert not doctor._python().is_ok
     monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [Port()])
-    monkeypatch.setattr(doctor.os, "access", lambda *_: False)
+    monkeypatch.setattr("tools.commands.doctor.os.access", lambda *_: False)
     assert "dialout" in doctor._serial_devices().text
-    monkeypatch.setattr(doctor.os, "access", lambda *_: True)
+    monkeypatch.setattr("tools.commands.doctor.os.access", lambda *_: True)
     assert doctor._serial_devices().text == "/dev/ttyACM0"
-    monkeypatch.setattr(doctor.time, "time", lambda: 1000.0)
+    monkeypatch.setattr("tools.commands.doctor.time.time", lambda: 1000.0)
     assert "1970-01-01" in doctor._clock().text
     assert not doctor._clock().is_ok
 
@@ -106,7 +106,7 @@ def test_a_vehicle_whose_link_does_not_open_is_told_why(
 def test_a_journal_folder_without_the_right_to_write_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(doctor.os, "access", lambda path, mode: mode != os.W_OK)  # noqa: ARG005
+    monkeypatch.setattr("tools.commands.doctor.os.access", lambda path, mode: mode != os.W_OK)  # noqa: ARG005
     text = '[link]\nurl = "udp:127.0.0.1:0"\n[journal]\nfolder = "new"'
     assert diagnose(vehicle_file(tmp_path, text)) == 1
     assert "no right to write" in line_of(capsys.readouterr().out, "journal folder")

@@ -13,7 +13,6 @@ from pathlib import Path
 from types import FrameType
 
 from bridge.measurement import Quantity
-from bridge.open import open_source
 from bridge.source import Source
 from firmware_model.estimate import Estimate
 from host.errors import ConfigError
@@ -45,6 +44,9 @@ def run(args: argparse.Namespace) -> int:
     """0 done; 1 a needed quantity never came, or the link was lost for good. Raises LinkError, HostError."""
     if args.duration is not None and not args.duration > 0:
         raise ConfigError(f"--duration must be above 0 s (got {args.duration:g})")
+    # Loaded here, so that `mils doctor` starts where pymavlink is missing.
+    from bridge.open import open_source
+
     vehicle = _configured(read_vehicle(args.vehicle), args)
 
     def opened() -> Source:
