@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("vehicle", metavar="VEHICLE.toml", type=Path, help="vehicle file")
     parser.add_argument("--link", metavar="URL", help="instead of link.url, e.g. udp:127.0.0.1:14550")
     parser.add_argument("--duration", metavar="S", type=float, help="stop after so many seconds")
-    parser.add_argument("--speed", metavar="N", type=float, help="log: links at N times real time; inf at once")
+    parser.add_argument("--speed", metavar="N", type=float, help="log: links at N times real time, or inf")
     parser.add_argument("--journal", metavar="PATH", type=Path, help="file ending in .jsonl, or folder")
     parser.add_argument("--no-state", action="store_true", help="neither restore nor save what was learnt")
     parser.add_argument("--quiet", action="store_true", help="no progress")
