@@ -13,12 +13,12 @@ from can.interfaces import BACKENDS
 
 from bridge.errors import LinkClosed, LinkError
 from bridge.link import Packet
-from bridge.links.socketcand import SocketcandBus
+from bridge.links.tcp import TcpLink
+from bridge.links.text_can import SLCAN_SETTLE_S, SlcanBus, SocketcandBus
 
 # python-can reports through logging what it then raises; unhandled, both would reach the terminal.
 logging.getLogger("can").addHandler(logging.NullHandler())
 
-SLCAN_SETTLE_S = 2.0  # an adapter that restarts when its port is opened needs this long
 _MULTICAST_GROUP = "239.74.163.2"  # python-can's default
 _BATCH = 1000  # frames handed over at once
 _WRITE_S = 0.1
@@ -59,8 +59,8 @@ class CanLink:
         interface, _, channel = rest.partition(":")
         try:
             return cls(_open_bus(interface, channel, slcan_settle_s), name)
-        except LinkError:
-            raise
+        except (LinkError, LinkClosed) as error:
+            raise LinkError(str(error)) from error
         except Exception as error:
             # Every backend of python-can raises classes of its own.
             raise LinkError(f"{name} cannot be opened: {_explain(channel, error)}") from error
@@ -74,14 +74,13 @@ class CanLink:
             try:
                 message = self._bus.recv(wait_s)
             except Exception as error:
-                if _is_gone(error):
-                    self._end = f"{self._name} is gone: {_cause(error)}"
-                    self.close()
-                    if packets:
-                        return packets  # the next read reports the end
-                    raise LinkClosed(self._end) from error
-                self._refuse(error)
-                break
+                if not _is_gone(error):
+                    self.counts["refused.bad_frame"] += 1
+                    break
+                self._end_with(error)
+                if packets:
+                    return packets  # the next read reports the end
+                raise LinkClosed(self._end) from error
             if message is None:
                 break
             wait_s = 0.0
@@ -108,8 +107,7 @@ class CanLink:
             self._bus.send(message, timeout=_WRITE_S)
         except Exception as error:
             if _is_gone(error):
-                self._end = f"{self._name} is gone: {_cause(error)}"
-                self.close()
+                self._end_with(error)
                 raise LinkClosed(self._end) from error
             self.counts["refused.write"] += 1
 
@@ -150,11 +148,9 @@ class CanLink:
         self._last_us = max(self._last_us, now_us)
         return self._last_us
 
-    def _refuse(self, error: Exception) -> None:
-        self.counts["refused.bad_frame"] += 1
-        flush = getattr(self._bus, "flush", None)
-        if isinstance(error.__cause__, UnicodeDecodeError) and flush is not None:
-            flush()  # slcan keeps the bytes it could not decode and would fail on them for ever
+    def _end_with(self, error: Exception) -> None:
+        self._end = str(error) if isinstance(error, LinkClosed) else f"{self._name} is gone: {_cause(error)}"
+        self.close()
 
 
 def _open_bus(interface: str, channel: str, slcan_settle_s: float) -> Any:
@@ -162,7 +158,7 @@ def _open_bus(interface: str, channel: str, slcan_settle_s: float) -> Any:
         match = re.fullmatch(r"(\[[^]]+\]|[^:]+):(\d{1,5}):(.+)", channel)
         if match is None:
             raise LinkError(f"can:socketcand must be followed by HOST:PORT:CHANNEL (got {channel!r})")
-        return SocketcandBus(match[1].strip("[]"), int(match[2]), match[3])
+        return SocketcandBus(TcpLink.open(match[1].strip("[]"), int(match[2])), match[3])
     if interface == "udp_multicast":
         match = re.fullmatch(r"(?:(\[[^]]+\]|[^:]+)(?::(\d{1,5}))?)?", channel)
         if match is None:
@@ -183,7 +179,10 @@ def _open_bus(interface: str, channel: str, slcan_settle_s: float) -> Any:
             f" sudo ip link set {channel} up type can bitrate {bitrate}"
         )
     if interface == "slcan":
-        options["sleep_after_open"] = slcan_settle_s
+        from bridge.links.serial import SerialLink  # pyserial is needed for this interface only
+
+        device, _, baud = channel.partition("@")
+        return SlcanBus(SerialLink.open(device, int(baud or 115200)), bitrate, slcan_settle_s)
     return can.Bus(channel, interface=interface, ignore_config=True, **options)
 
 
@@ -194,6 +193,8 @@ def _split_bitrate(channel: str) -> tuple[str, int | None]:
 
 def _is_gone(error: Exception) -> bool:
     """Whether the device or the peer has left, rather than that one frame was bad or one queue full."""
+    if isinstance(error, LinkClosed):
+        return True
     if isinstance(error, can.CanTimeoutError):
         return False
     number = _errno(error)
@@ -222,13 +223,11 @@ def _explain(channel: str, error: Exception) -> str:
     advice = {
         errno.EAFNOSUPPORT: "the kernel has no CAN support: sudo modprobe can_raw, or take slcan, socketcand",
         errno.ENODEV: f"there is no interface {channel}: `ip link show type can` lists them",
-        errno.ENOENT: f"there is no {channel.partition(':')[0]}: is the adapter plugged in?",
-        errno.EACCES: f"no permission: sudo usermod -aG dialout $USER, then log in again ({cause})",
+        errno.EACCES: f"no permission ({cause})",
         errno.EBUSY: f"another program is using it ({cause})",
-        errno.ECONNREFUSED: "no server listens there: start socketcand on that host and port",
     }
     if "msgpack" in text:
         return "msgpack is missing: pip install 'python-can[multicast]'"
-    if "serial module" in text:
+    if "serial" in text and isinstance(error, ImportError | NotImplementedError):
         return "pyserial is missing: pip install pyserial"
     return advice.get(number or 0, cause)

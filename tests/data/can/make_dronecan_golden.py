@@ -1,6 +1,6 @@
 """Writes dronecan_golden.json with the vendor's library: `pip install dronecan`, then run this file.
 
-Each entry: identifier and frames of one broadcast of node 42 with transfer id 5, as pydronecan 1.0 makes them.
+Each entry: identifier and frames of one broadcast of node 42 with transfer id 5, made by pydronecan 1.0.
 """
 
 import json
