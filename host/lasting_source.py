@@ -15,8 +15,9 @@ _LONGEST_WAIT = 10.0  # s
 class LastingSource:
     """Reads from `source`, and when its link closes from the next one that `reopen` opens.
 
-    A link that closes is reported once and opened again, at first after 0.5 s and then ever more seldom, for
-    `reopen_for` s. The boots of a reopened source count on from those before. The counts go on as well, with
+    A link that closes is reported once and opened again, at first after 0.5 s and then ever more seldom,
+    until measurements come again or `reopen_for` s are over; one that opens and closes without any is still
+    lost. The boots of a reopened source count on from those before. The counts go on as well, with
     "link.lost" and "link.reopened" among them.
 
     clock   monotonic time, s
@@ -42,7 +43,8 @@ class LastingSource:
         self._say = say
         self._earlier: Counter[str] = Counter()
         self._first_boot = self._last_boot = 0
-        self._lost_at = self._next_attempt = 0.0
+        self._lost_at: float | None = None
+        self._next_attempt = 0.0
         self._wait = _FIRST_WAIT
         self._over: LinkClosed | None = None
 
@@ -67,6 +69,9 @@ class LastingSource:
         except LinkClosed as closed:
             self._lose(closed)
             return self.read(timeout_s)
+        if measurements and self._lost_at is not None:
+            self._say(f"measurements come again after {self._clock() - self._lost_at:.1f} s")
+            self._lost_at = None
         renumbered = [replace(m, boot=self._first_boot + m.boot) for m in measurements]
         self._last_boot = max([self._last_boot, *(m.boot for m in renumbered)])
         return renumbered
@@ -95,12 +100,13 @@ class LastingSource:
         if self._reopen_for <= 0:
             self._over = cause
             return
-        self._earlier["link.lost"] += 1
-        self._first_boot = self._last_boot + 1
-        self._lost_at = self._clock()
-        self._wait = _FIRST_WAIT
-        self._next_attempt = self._lost_at + self._wait
-        self._say(f"link lost ({cause}); trying to open it again for {self._reopen_for:g} s")
+        if self._lost_at is None:
+            self._lost_at = self._clock()
+            self._wait = _FIRST_WAIT
+            self._first_boot = self._last_boot + 1
+            self._earlier["link.lost"] += 1
+            self._say(f"link lost ({cause}); trying to open it again for {self._reopen_for:g} s")
+        self._retry_later(self._lost_at, cause)
 
     def _try_again(self, timeout_s: float) -> None:
         now = self._clock()
@@ -109,12 +115,14 @@ class LastingSource:
             return
         try:
             self._source = self._reopen()
+            self._earlier["link.reopened"] += 1
         except BridgeError as error:
-            if now - self._lost_at >= self._reopen_for:
-                self._over = LinkClosed(f"link lost for {self._reopen_for:g} s and given up ({error})")
-                raise self._over from error
-            self._wait = min(2 * self._wait, _LONGEST_WAIT)
-            self._next_attempt = self._clock() + self._wait
-            return
-        self._earlier["link.reopened"] += 1
-        self._say(f"link opened again after {now - self._lost_at:.1f} s")
+            assert self._lost_at is not None
+            self._retry_later(self._lost_at, error)
+
+    def _retry_later(self, lost_at: float, cause: BridgeError) -> None:
+        now = self._clock()
+        if now - lost_at >= self._reopen_for:
+            self._over = LinkClosed(f"link lost for {self._reopen_for:g} s and given up ({cause})")
+        self._next_attempt = now + self._wait
+        self._wait = min(2 * self._wait, _LONGEST_WAIT)

@@ -85,7 +85,8 @@ def test_a_reopened_link_counts_on_and_starts_a_new_boot() -> None:
     assert counts["ATTITUDE"] == 4
     assert (counts["link.lost"], counts["link.reopened"]) == (2, 1)
     assert setting.said[0] == "link lost (unplugged); trying to open it again for 60 s"
-    assert setting.said[1] == "link opened again after 1.5 s"
+    assert setting.said[1] == "measurements come again after 1.5 s"
+    assert len(setting.said) == 3
 
 
 def test_attempts_grow_rarer_and_end() -> None:
@@ -98,6 +99,15 @@ def test_attempts_grow_rarer_and_end() -> None:
     assert len(setting.said) == 1
     with pytest.raises(LinkClosed, match="given up"):
         setting.source.read(0.1)
+
+
+def test_a_link_that_opens_and_closes_at_once_is_still_lost() -> None:
+    setting = Setting(Scripted([0]), [Scripted([]) for _ in range(100)])
+    with pytest.raises(LinkClosed, match="given up"):
+        setting.boots(10_000)
+    assert len(setting.said) == 1
+    assert setting.source.counts["link.lost"] == 1
+    assert 9 <= setting.source.counts["link.reopened"] <= 12
 
 
 def test_a_link_that_is_not_to_be_reopened_ends_at_once() -> None:
