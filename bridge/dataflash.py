@@ -26,6 +26,7 @@ _OUTPUTS = {"RCOU", "RCO2", "RCO3"}
 _OLD_BAROMETERS = {"BARO": 0, "BAR2": 1, "BAR3": 2}  # before 4.1 each instance had its own name
 _WANTED = {"ATT", "RATE", "CSRV", *_OLD_BAROMETERS, *_HEIGHTS, *_OUTPUTS}
 _OLDEST_SAMPLE_US = 1_000_000
+_NO_RECEIVE_CLOCK = 0  # a log of the vehicle itself: only the stamps can confirm each other
 
 
 def read_dataflash(path: Path, mapping: MavlinkMap) -> tuple[list[Measurement], Counter[str], list[str]]:
@@ -64,7 +65,7 @@ class _Reader:
     def take(self, name: str, fields: dict[str, Any]) -> None:
         stamp = fields["TimeUS"]
         # ArduSub 4.7-dev writes RATE with the stamp 0.
-        t_us = self._clock.from_boot(stamp, stamp) if stamp else None
+        t_us = self._clock.from_boot(stamp, _NO_RECEIVE_CLOCK) if stamp else None
         if t_us is None:
             self.counts["refused.time_step"] += 1
         elif name == "ATT":

@@ -1,7 +1,7 @@
 """Measurements, estimates and requests to MAVLink 2 frames: the inverse of the decoder for the same map."""
 
 from collections.abc import Iterable, Mapping
-from math import cos, nan, sin
+from math import copysign, cos, inf, nan, sin
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -12,6 +12,7 @@ from bridge.measurement import Measurement, Quantity
 from bridge.servo_mix import pulses_for
 
 _UINT32 = 0xFFFFFFFF
+_FLOAT_MAX = 3.4e38  # single precision
 MAX_NAME = 10  # characters of NAMED_VALUE_FLOAT
 
 
@@ -80,15 +81,15 @@ class MavlinkEncoder:
 
     def heartbeat(self) -> bytes:
         """HEARTBEAT of a companion computer."""
+        return self._heartbeat(dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID)
+
+    def vehicle_heartbeat(self) -> bytes:
+        """HEARTBEAT of a submarine's autopilot, for a log that is replayed as the vehicle."""
+        return self._heartbeat(dialect.MAV_TYPE_SUBMARINE, dialect.MAV_AUTOPILOT_GENERIC)
+
+    def _heartbeat(self, kind: int, autopilot: int) -> bytes:
         return self._pack(
-            dialect.MAVLink_heartbeat_message(
-                dialect.MAV_TYPE_ONBOARD_CONTROLLER,
-                dialect.MAV_AUTOPILOT_INVALID,
-                0,
-                0,
-                dialect.MAV_STATE_ACTIVE,
-                3,
-            )
+            dialect.MAVLink_heartbeat_message(kind, autopilot, 0, 0, dialect.MAV_STATE_ACTIVE, 3)
         )
 
     def named_values(self, t_us: int, values: Mapping[str, float]) -> bytes:
@@ -99,7 +100,8 @@ class MavlinkEncoder:
             if not 1 <= len(raw) <= MAX_NAME:
                 raise ValueError(f"name must have 1..{MAX_NAME} characters (got {name!r})")
             boot_ms = (t_us // 1000) & _UINT32
-            packed += self._pack(dialect.MAVLink_named_value_float_message(boot_ms, raw, value))
+            single = value if abs(value) <= _FLOAT_MAX else copysign(inf, value)
+            packed += self._pack(dialect.MAVLink_named_value_float_message(boot_ms, raw, single))
         return packed
 
     def request_rate(self, target: tuple[int, int], message: str, rate_hz: float) -> bytes:

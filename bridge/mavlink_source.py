@@ -13,7 +13,8 @@ from bridge.measurement import Measurement
 _HEARTBEAT_US = 1_000_000
 _SUPERVISE_US = 10_000_000  # also the shortest time between two requests
 _ENOUGH = 0.6  # of the requested rate; a ground station's own request or a download lowers it
-_POSITION = "LOCAL_POSITION_NED"
+# Many links carry only heartbeats before somebody asks; while depth_source auto listens, it hears these.
+_DEPTH_CANDIDATES = ("SCALED_PRESSURE2", "SCALED_PRESSURE", "VFR_HUD")
 
 
 class MavlinkSource:
@@ -99,9 +100,9 @@ class MavlinkSource:
                 wanted[message] = max(rate_hz, wanted.get(message, 0.0))
 
         want("ATTITUDE", mapping.attitude_rate_hz)
-        # While `auto` still listens, only what the vehicle sends by itself is compared.
-        if self._decoder.depth_source is not None:
-            want(self._decoder.depth_source, mapping.depth_rate_hz)
+        source = self._decoder.depth_source
+        for message in _DEPTH_CANDIDATES if source is None else (source,):
+            want(message, mapping.depth_rate_hz)
         if mapping.rudder:
             want("SERVO_OUTPUT_RAW", mapping.servo_rate_hz)
         if mapping.speed_source != "none":

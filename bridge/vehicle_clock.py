@@ -4,7 +4,7 @@ _US = 1_000_000
 _MS_WRAP = 2**32 * 1000  # us; time_boot_ms is a uint32, 49.7 days
 _US_WRAP = 2**32  # us; SERVO_OUTPUT_RAW.time_usec is a uint32, 71.6 min
 _JITTER = 1 * _US  # messages overtake each other by less than this
-_LEAP = 10 * _US  # a larger step needs a second message that confirms it
+_LEAP = 10 * _US  # a larger step needs a second message that confirms it, at most so much later
 _LONGEST_PAUSE = 3600 * _US  # between the boots of one timeline; receive clocks can be years off
 _RELEARN = 1 * _US  # a delay that grew by more than this is a new link or a slower clock
 _LEAK = 2e-4  # share of the excess that the smallest delay gives up per message, to follow drifting clocks
@@ -13,8 +13,9 @@ _LEAK = 2e-4  # share of the excess that the smallest delay gives up per message
 class VehicleClock:
     """Puts every stamp on the clock of the vehicle's first boot.
 
-    A step back, or a leap ahead by more than 10 s, counts only once a second message agrees with it; the
-    first one is refused (None). So a single absurd stamp moves nothing, and a restart costs one message.
+    A step of more than 1 s back, or ahead of the receive time that has passed, counts only once a second
+    message agrees with it; the first one is refused (None). So a single absurd stamp moves nothing, and a
+    restart costs one message.
     After a restart `boot` is one higher and the timeline goes on by the receive time that has passed.
     """
 
@@ -31,7 +32,8 @@ class VehicleClock:
         if self._latest is not None:
             boot_us = _unwrap(boot_us, self._latest, _MS_WRAP)
             step = boot_us - self._latest
-            if not -_JITTER <= step <= _LEAP:
+            elapsed = min(max(receive_us - self._latest_receive, 0), _LEAP)
+            if not -_JITTER <= step <= _JITTER + elapsed:
                 if self._suspect is None or not -_JITTER <= boot_us - self._suspect <= _LEAP:
                     self._suspect = boot_us
                     return None

@@ -1,19 +1,15 @@
-"""Prints what a log holds: `python -m tools.log_counts FILE... [--rudder CHANNEL:RAD_PER_US ...]`."""
+"""Prints what a log holds: `python -m tools.log_counts FILE... [--vehicle VEHICLE.toml]`."""
 
 import argparse
 import sys
 import time
 from collections import Counter
+from pathlib import Path
 
-from bridge.can_map import CanMap
 from bridge.errors import BridgeError
 from bridge.logs import LogReading, read_log
-from bridge.mavlink_map import MavlinkMap, ServoTerm
-
-
-def servo_term(text: str) -> ServoTerm:
-    channel, rad_per_us = text.split(":")
-    return ServoTerm(channel=int(channel), rad_per_us=float(rad_per_us))
+from host.errors import HostError
+from host.vehicle import default_vehicle, read_vehicle
 
 
 def describe(name: str, reading: LogReading, cpu_s: float) -> str:
@@ -31,14 +27,18 @@ def describe(name: str, reading: LogReading, cpu_s: float) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description="what a log holds")
     parser.add_argument("files", nargs="+", metavar="FILE")
-    parser.add_argument("--rudder", nargs="*", type=servo_term, default=[], metavar="CHANNEL:RAD_PER_US")
+    parser.add_argument("--vehicle", type=Path, metavar="VEHICLE.toml", help="what the channels mean")
     args = parser.parse_args()
-    mapping = MavlinkMap(rudder=tuple(args.rudder))
+    try:
+        vehicle = read_vehicle(args.vehicle) if args.vehicle else default_vehicle()
+    except HostError as error:
+        print(error, file=sys.stderr)
+        return 2
     status = 0
     for name in args.files:
         begin = time.process_time()
         try:
-            reading = read_log(name, mapping, CanMap())
+            reading = read_log(name, vehicle.mavlink, vehicle.can)
         except BridgeError as error:
             print(error, file=sys.stderr)
             status = 2

@@ -3,6 +3,9 @@
 Why these numbers: over the whole dive the simulated barometer is 10,042.5 Pa/m times the true depth, which is
 1024 kg/m3, plus 101,315 Pa, which is the standard atmosphere to 0.1 hPa. Barometer 1 is the one to use: the
 simulator adds 10 cm of wander to the second. Motors 5-8 are the vertical ones of the vectored 6-DOF frame.
+
+The truth is taken at the times the recorder gave it. The pitch error grows with the pitch rate as a constant
+offset of some 10 ms would; where that comes from is not known, and nothing is shifted to remove it.
 """
 
 from math import degrees, sqrt
@@ -22,12 +25,13 @@ MAPPING = MavlinkMap(
     depth_source="SCALED_PRESSURE",
     water_density=1024.0,
     surface_pressure_hpa=1013.25,
-    rudder=tuple(ServoTerm(channel=n, rad_per_us=6.25e-4 if n < 7 else -6.25e-4) for n in (5, 6, 7, 8)),
+    rudder=(
+        *(ServoTerm(channel=channel, rad_per_us=6.25e-4) for channel in (5, 6)),
+        *(ServoTerm(channel=channel, rad_per_us=-6.25e-4) for channel in (7, 8)),
+    ),
     speed_source="LOCAL_POSITION_NED",
 )
 TRUTH = np.genfromtxt(DATA / "dive_truth.csv", delimiter=",", names=True)
-# The recorder stamped the truth with the last attitude that had come, at 50 Hz: half a period late on average.
-TRUTH["time_boot_s"] -= 0.01
 
 
 @pytest.fixture(scope="module", params=["dive.tlog", "dive.BIN"])
@@ -54,7 +58,9 @@ def test_pitch_is_within_a_fifth_of_a_degree_of_the_simulator(dive: LogReading) 
 
 def test_repeated_pressures_are_dropped(dive: LogReading) -> None:
     """The simulated sensor gives 10 values a second, sent up to 50 times a second."""
-    assert len(of(dive.measurements, Quantity.DEPTH)) == pytest.approx(220, abs=3)
+    depth = of(dive.measurements, Quantity.DEPTH)
+    seconds = (depth[-1].t_us - depth[0].t_us) * 1e-6
+    assert len(depth) / seconds == pytest.approx(10.0, rel=0.02)
 
 
 def test_positive_thruster_mix_pitches_the_nose_down(dive: LogReading) -> None:

@@ -92,6 +92,17 @@ def test_heartbeat_is_that_of_a_companion() -> None:
     assert (message.get_srcSystem(), message.get_srcComponent()) == (1, 191)
 
 
+def test_replayed_vehicle_is_locked_onto() -> None:
+    decoder = MavlinkDecoder(MavlinkMap())
+    decoder.feed(MavlinkEncoder(MavlinkMap(), system=3, component=1).vehicle_heartbeat(), 0)
+    assert decoder.vehicle == (3, 1)
+
+
+def test_value_beyond_single_precision_is_sent_as_infinite() -> None:
+    messages = read_by_pymavlink(encoder().named_values(0, {"std": 1e300, "low": -1e300}))
+    assert [message.value for message in messages] == [float("inf"), float("-inf")]
+
+
 def test_named_values_are_read_by_pymavlink_and_count_up() -> None:
     messages = read_by_pymavlink(encoder().named_values(5_000_000, {"Mq": -1.25, "0123456789": 2.0}))
     assert [(m.name, m.value, m.time_boot_ms) for m in messages] == [

@@ -37,7 +37,7 @@ class MemoryLink:
 
 def start(**settings: object) -> tuple[MavlinkSource, MemoryLink, Vehicle]:
     link = MemoryLink()
-    mapping = MavlinkMap(depth_source="SCALED_PRESSURE2", **settings)  # type: ignore[arg-type]
+    mapping = MavlinkMap(**{"depth_source": "SCALED_PRESSURE2", **settings})  # type: ignore[arg-type]
     source: Source = MavlinkSource(link, mapping, clock_us=lambda: link.now_us)
     assert isinstance(source, MavlinkSource)
     return source, link, Vehicle(system=7)
@@ -75,6 +75,13 @@ def test_rates_are_requested_once_the_vehicle_is_known_with_its_system_id() -> N
     assert set(requests) == {30.0, 137.0, 36.0, 74.0}
     assert {message.get_srcSystem() for message in requests.values()} == {7}
     assert {message.target_system for message in requests.values()} == {7}
+
+
+def test_auto_depth_asks_for_what_it_would_choose_from() -> None:
+    source, link, vehicle = start(depth_source="auto", attitude_rate_hz=0.0)
+    link.incoming.append(vehicle.heartbeat())
+    source.read(0.1)
+    assert {message.param1 for message in link.of("COMMAND_LONG")} == {29.0, 137.0, 74.0}
 
 
 def test_rate_zero_requests_nothing() -> None:

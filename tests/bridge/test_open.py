@@ -78,7 +78,9 @@ def test_udp_source_measures_answers_and_counts_strangers() -> None:
         out += source.read(0.2)
         assert len(out) == 2
         assert source.counts["refused.udp_sender"] == 1
-        assert sub.recv(300)[7:10] == b"\x4c\0\0"  # COMMAND_LONG: the rate request
         source.publish(1_000_000, {"a1": -0.6})
-        assert b"a1" in sub.recv(300)
+        answers = [sub.recv(300)]
+        while b"a1" not in answers[-1]:
+            answers.append(sub.recv(300))
+        assert answers[0][7:10] == b"\x4c\0\0"  # COMMAND_LONG: the first rate request
     source.close()

@@ -109,7 +109,7 @@ def test_file_without_mavlink_is_refused(tmp_path: Path) -> None:
 
 @given(garbage=st.lists(st.binary(max_size=60), min_size=50, max_size=50))
 @settings(max_examples=40, deadline=None)
-def test_garbage_between_records_loses_none(garbage: list[bytes]) -> None:  # noqa: ARG001
+def test_garbage_between_records_loses_none(garbage: list[bytes]) -> None:
     data = b"".join(noise + entry for noise, entry in zip(garbage, steady(), strict=True))
     assert len(frames_in(data)[0]) >= 50
 

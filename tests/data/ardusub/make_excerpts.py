@@ -1,21 +1,26 @@
 """Cuts the excerpts beside this file out of whole recordings: `python make_excerpts.py FOLDER`.
 
 FOLDER holds small.tlog, small.BIN, 2023-04-18_11-03-34.tlog (ardusub_log_tools) and sub_6dof_gentle.tlog,
-.BIN, .csv. The real ones are cut by length, so that damage stays as it was; the dive by time and message.
+.BIN, .csv. The real ones are cut by length, so that damage stays as it was; the dive is whole and thinned by message.
 """
 
 import csv
 import struct
 import sys
+from collections import Counter
 from pathlib import Path
 
 HERE = Path(__file__).parent
-BEGIN_S, END_S = 90.0, 112.0  # of the dive, since boot
-MESSAGES = {
-    *("HEARTBEAT", "ATTITUDE", "SCALED_PRESSURE", "SCALED_PRESSURE2", "SCALED_PRESSURE3", "SERVO_OUTPUT_RAW"),
-    *("LOCAL_POSITION_NED", "VFR_HUD", "STATUSTEXT", "COMMAND_ACK", "NAMED_VALUE_FLOAT"),
+BEGIN_S, END_S = 79.0, 187.1  # since boot: the whole part for which the .csv holds the truth
+# Every n-th message of a kind is kept, to keep the file small.
+KEEP_EVERY = {
+    "HEARTBEAT": 1,
+    "SCALED_PRESSURE": 1,
+    "ATTITUDE": 2,
+    "SERVO_OUTPUT_RAW": 5,
+    "SCALED_PRESSURE3": 10,
 }
-RECORDS = {"ATT", "BARO", "RCOU", "RCO2", "XKF1", "CTUN", "AHR2", "RATE"}
+RECORDS = {"ATT", "BARO", "RCOU"}
 
 
 def cut_dive_tlog(source: Path, target: Path) -> None:
@@ -23,10 +28,14 @@ def cut_dive_tlog(source: Path, target: Path) -> None:
 
     log = mavutil.mavlink_connection(str(source))
     boot_ms = 0
+    seen: Counter[str] = Counter()
     with target.open("wb") as out:
         while (message := log.recv_msg()) is not None:
             boot_ms = getattr(message, "time_boot_ms", boot_ms)
-            if message.get_type() in MESSAGES and BEGIN_S <= boot_ms / 1000 < END_S:
+            kind = message.get_type()
+            seen[kind] += 1
+            every = KEEP_EVERY.get(kind)
+            if every and seen[kind] % every == 0 and BEGIN_S <= boot_ms / 1000 < END_S:
                 out.write(struct.pack(">Q", round(message._timestamp * 1e6)) + message.get_msgbuf())
 
 
