@@ -1,7 +1,8 @@
 """Cuts the excerpts beside this file out of whole recordings: `python make_excerpts.py FOLDER`.
 
 FOLDER holds small.tlog, small.BIN, 2023-04-18_11-03-34.tlog (ardusub_log_tools) and sub_6dof_gentle.tlog,
-.BIN, .csv. The real ones are cut by length, so that damage stays as it was; the dive is whole and thinned by message.
+.BIN, .csv. The real ones are cut by length, so that damage stays as it was; the dive is
+whole and thinned by message.
 """
 
 import csv
