@@ -81,7 +81,7 @@ def test_slip_is_answered_in_one_line(text, says):
 
 
 def test_missing_file_names_the_shipped_ones():
-    with pytest.raises(ScenarioError, match="no_such cannot be read: .*; shipped ones: default, fin_damage"):
+    with pytest.raises(ScenarioError, match=r"no_such cannot be read: .*; shipped ones: default, fin_damage"):
         load("no_such")
 
 
@@ -94,5 +94,5 @@ def test_file_that_is_not_text_is_refused(tmp_path):
 def test_message_names_the_file(tmp_path):
     path = tmp_path / "x.toml"
     path.write_text("seed = -1")
-    with pytest.raises(ScenarioError, match="x.toml: seed must be >= 0"):
+    with pytest.raises(ScenarioError, match=r"x\.toml: seed must be >= 0"):
         load(str(path))

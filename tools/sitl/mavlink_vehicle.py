@@ -137,6 +137,7 @@ class MavlinkVehicle:
     def _send(self, message: Any) -> None:
         self.sent[message.get_type()] += 1
         self.transport.send(message.pack(self.mav))
+        self.mav.seq = (self.mav.seq + 1) % 256
 
     def _answer(self, message: Any) -> None:
         kind = message.get_type()
