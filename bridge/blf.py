@@ -23,6 +23,7 @@ _CAN_FD = Struct("<HBBLLBBB5x")  # channel, flags, dlc, id, -, -, -, valid bytes
 _CAN_FD_64 = Struct("<BBBBLLLLLLLHBBL")  # channel, dlc, valid bytes, -, id, -, flags, ...
 _MESSAGE, _ERROR, _CONTAINER_TYPE, _ERROR_EXT, _MESSAGE2, _FD, _FD_64 = 1, 2, 10, 73, 86, 100, 101
 _MAX_CONTAINER = 16 << 20  # 128 KiB is usual; no header may claim more than this
+_MAX_OBJECT = 1 << 20  # a frame has 160 bytes at most, a comment more
 _EXTENDED = 0x80000000
 
 
@@ -43,7 +44,7 @@ def read_blf(path: Path, counts: Counter[str], warnings: list[str]) -> Iterator[
             f"{path}: the start time is missing (its writer was killed), times count from the start"
         )
     tail = b""
-    for content in _containers(data, header[1], counts):
+    for content in _containers(data, counts):
         content = tail + content
         position = 0
         while True:
@@ -55,19 +56,20 @@ def read_blf(path: Path, counts: Counter[str], warnings: list[str]) -> Iterator[
                 counts["refused.object"] += 1
             head = content[found : found + _OBJECT.size]
             size = _OBJECT.unpack(head)[3] if len(head) == _OBJECT.size else _OBJECT.size
-            if found + size > len(content) and size <= _MAX_CONTAINER:
+            if found + size > len(content) and size <= _MAX_OBJECT:
                 tail = content[found:]  # goes on in the next container
                 break
             packet = _frame(content[found : found + size], start_us, counts)
             if packet is not None:
                 yield packet
-            position = found + max(size, 4) if size <= _MAX_CONTAINER else found + 4
+            position = found + max(size, 4) if size <= _MAX_OBJECT else found + 4
     if tail:
         counts["refused.object"] += 1
 
 
-def _containers(data: bytes, position: int, counts: Counter[str]) -> Iterator[bytes]:
+def _containers(data: bytes, counts: Counter[str]) -> Iterator[bytes]:
     """Uncompressed contents, from one container signature to the next."""
+    position = _FILE.size
     while (found := data.find(b"LOBJ", position)) >= 0:
         position = found + 4
         try:

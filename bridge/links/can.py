@@ -21,6 +21,7 @@ logging.getLogger("can").addHandler(logging.NullHandler())
 
 _MULTICAST_GROUP = "239.74.163.2"  # python-can's default
 _BATCH = 1000  # frames handed over at once
+_HOPELESS = 1000  # failed receives in a row: a driver that says nothing of having lost its device
 _WRITE_S = 0.1
 _MAX_AGE_S = 5.0  # no frame waits longer for its reader
 
@@ -44,6 +45,7 @@ class CanLink:
         self._monotonic_ns = monotonic_ns
         self._wall_s = wall_s
         self._last_us = 0
+        self._failed = 0
         self._end = f"{name} is closed"
 
     @classmethod
@@ -70,11 +72,12 @@ class CanLink:
             raise LinkClosed(self._end)
         packets: list[Packet] = []
         wait_s = max(0.0, timeout_s)
-        while len(packets) < _BATCH:
+        for _ in range(_BATCH):
             try:
                 message = self._bus.recv(wait_s)
             except Exception as error:
-                if not _is_gone(error):
+                self._failed += 1
+                if not _is_gone(error) and self._failed < _HOPELESS:
                     self.counts["refused.bad_frame"] += 1
                     break
                 self._end_with(error)
@@ -84,6 +87,7 @@ class CanLink:
             if message is None:
                 break
             wait_s = 0.0
+            self._failed = 0
             packet = self._to_packet(message)
             if packet is not None:
                 packets.append(packet)

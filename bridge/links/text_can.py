@@ -7,11 +7,12 @@ end of the connection nor survives a damaged element.
 import re
 import time
 from collections import deque
+from contextlib import suppress
 from typing import Any
 
 import can
 
-from bridge.errors import LinkError
+from bridge.errors import LinkClosed, LinkError
 from bridge.link import Link, Packet
 
 _ANSWER_S = 3.0
@@ -68,6 +69,11 @@ class SlcanBus(_TextBus):
         time.sleep(settle_s)
         # C closes the channel that a program before may have left open; its answers are passed over.
         self._say("C\r" + ("" if bitrate is None else f"S{_SLCAN_BITRATES[bitrate]}\r") + "O\r")
+
+    def shutdown(self) -> None:
+        with suppress(LinkClosed):
+            self._say("C\r")  # or the adapter goes on sending
+        super().shutdown()
 
     def recv(self, timeout: float) -> can.Message | None:
         """The next frame; raises ValueError for a line that is none."""

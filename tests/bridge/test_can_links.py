@@ -366,6 +366,33 @@ def test_times_do_not_jump_with_the_wall_clock() -> None:
     assert link.counts["close_failed"] == 1
 
 
+class BrokenBus:
+    """A driver that raises for ever and names no cause."""
+
+    def recv(self, timeout: float) -> can.Message | None:  # noqa: ARG002
+        raise can.CanOperationError("receive failed")
+
+    def send(self, message: can.Message, timeout: float) -> None:  # noqa: ARG002
+        raise can.CanOperationError("Network is down", 100)
+
+    def shutdown(self) -> None:
+        pass
+
+
+def test_driver_that_only_fails_is_given_up() -> None:
+    link = CanLink(BrokenBus(), "can:maker:0")
+    assert [link.read(0.0) for _ in range(999)] == [[]] * 999
+    with pytest.raises(LinkClosed, match="can:maker:0 is gone: receive failed"):
+        link.read(0.0)
+    assert link.counts == {"refused.bad_frame": 999}
+
+
+def test_interface_that_goes_down_ends_the_link_on_write() -> None:
+    link = CanLink(BrokenBus(), "can:socketcan:can0")
+    with pytest.raises(LinkClosed, match="Network is down"):
+        link.write(SHORT)
+
+
 @pytest.mark.parametrize(
     ("rest", "words"),
     [
