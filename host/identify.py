@@ -10,11 +10,12 @@ import numpy as np
 from host.equations import NAMES
 from host.identify_car import car_least_squares, run_estimator
 from host.maximum_likelihood import LOWER, UPPER, Fit, fit_maximum_likelihood
-from host.model import VehicleModel, program_version
+from host.model import VehicleModel
 from host.predict import Prediction, predict
 from host.recording import Array, Recording
 from host.uncertainty import covariance, undetermined
 from host.vehicle import Vehicle
+from host.version import program_version
 from host.whiteness import is_white
 
 Method = Literal["car", "mils", "ml"]

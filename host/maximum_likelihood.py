@@ -17,7 +17,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
 from host.equations import PARAMETERS
-from host.propagate import NP, NX, Inputs, innovations, inputs_of, kalman_pass
+from host.propagate import NP, NX, Inputs, free_run, innovations, inputs_of, kalman_pass
 from host.recording import Array, Recording
 from host.start_values import start_values
 from host.whiteness import is_white
@@ -108,7 +108,7 @@ def _output_error(start: _Point, inputs: list[Inputs], free: Mask, most_iteratio
     """Gauss-Newton on the free run, the noise variances concentrated out."""
     point, damping, converged, iterations = start, 1e-3, False, 0
     parts = [innovations(point.parameters, x0, i) for x0, i in zip(point.initial, inputs, strict=True)]
-    noise = _residual_noise(parts, inputs)
+    noise = _residual_noise([error for error, _ in parts], inputs)
     cost = _concentrated_cost(noise, inputs)
     while not converged and iterations < most_iterations:
         iterations += 1
@@ -116,10 +116,7 @@ def _output_error(start: _Point, inputs: list[Inputs], free: Mask, most_iteratio
         step = _GaussNewton(white, point, free)
         while True:
             trial = step.trial(damping)
-            trial_parts = [
-                innovations(trial.parameters, x0, i) for x0, i in zip(trial.initial, inputs, strict=True)
-            ]
-            trial_noise = _residual_noise(trial_parts, inputs)
+            trial_noise = _residual_noise(_free_run_errors(trial, inputs), inputs)
             trial_cost = _concentrated_cost(trial_noise, inputs)
             if trial_cost < cost or damping > 1e8:
                 break
@@ -127,8 +124,9 @@ def _output_error(start: _Point, inputs: list[Inputs], free: Mask, most_iteratio
         if not trial_cost < cost:
             converged = True
             break
-        converged = cost - trial_cost < 1e-4
-        cost, point, parts, noise = trial_cost, trial, trial_parts, trial_noise
+        converged = cost - trial_cost < 1e-3
+        cost, point, noise = trial_cost, trial, trial_noise
+        parts = [innovations(point.parameters, x0, i) for x0, i in zip(point.initial, inputs, strict=True)]
         damping = damping / 10.0
     white = [_whiten(e, S, _constant_variance(noise, e.shape[1])) for e, S in parts]
     full_noise = np.concatenate([noise, [0.0, 0.0]])
@@ -141,12 +139,12 @@ def _filter_error(start: Fit, inputs: list[Inputs], free: Mask, rounds: int = 6)
     # Half of what output error calls sensor noise may really be force: a neutral place to begin.
     first = np.concatenate([start.noise[:2] / 2.0, start.noise[:2][::-1] * step])
     point = _Point(start.parameters, start.initial, first)
-    point, likelihood = _fit_noise(point, inputs)
+    point, likelihood = _fit_noise(point, inputs, evaluations=70)
     converged, used = False, 0
     while not converged and used < rounds:
         used, before = used + 1, likelihood
         point, likelihood = _gauss_newton_filter(point, inputs, free, likelihood)
-        point, likelihood = _fit_noise(point, inputs)
+        point, likelihood = _fit_noise(point, inputs, evaluations=30)
         converged = likelihood - before < 0.05
     white = [_whitened_at(point, x0, i) for x0, i in zip(point.initial, inputs, strict=True)]
     return _finished(point, white, inputs, free, likelihood, used, converged)
@@ -176,7 +174,7 @@ def _gauss_newton_filter(
     return point, likelihood
 
 
-def _fit_noise(point: _Point, inputs: list[Inputs]) -> tuple[_Point, float]:
+def _fit_noise(point: _Point, inputs: list[Inputs], evaluations: int) -> tuple[_Point, float]:
     """Simplex search over three log ratios to the pitch variance; the common scale has a closed form."""
 
     def scaled(log_ratios: Array) -> tuple[Array, float]:
@@ -194,9 +192,9 @@ def _fit_noise(point: _Point, inputs: list[Inputs]) -> tuple[_Point, float]:
         method="Nelder-Mead",
         options=dict(
             initial_simplex=start + np.vstack([np.zeros(3), np.diag([0.7, 2.0, 2.0])]),
-            xatol=0.02,
-            fatol=0.02,
-            maxfev=90,
+            xatol=0.05,
+            fatol=0.05,
+            maxfev=evaluations,
         ),
     )
     noise, cost = scaled(result.x)
@@ -250,10 +248,17 @@ def _constant_variance(noise: Array, rows: int) -> Array:
     return np.repeat(np.array([[noise[0]], [0.0], [noise[1]]]), rows, axis=1)
 
 
-def _residual_noise(parts: list[tuple[Array, Array]], inputs: list[Inputs]) -> Array:
+def _free_run_errors(point: _Point, inputs: list[Inputs]) -> list[Array]:
+    return [
+        one.present * (one.measured - free_run(point.parameters, x0, one)[2:])
+        for x0, one in zip(point.initial, inputs, strict=True)
+    ]
+
+
+def _residual_noise(errors: list[Array], inputs: list[Inputs]) -> Array:
     count = sum(one.present.sum(axis=1) for one in inputs)
     with np.errstate(over="ignore", invalid="ignore"):
-        squares = np.sum([np.sum(error**2, axis=1) for error, _ in parts], axis=0)
+        squares = np.sum([np.sum(error**2, axis=1) for error in errors], axis=0)
         variance: Array = np.maximum(np.nan_to_num(squares / count, nan=np.inf), SMALLEST_NOISE)
     return variance
 

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -45,11 +44,6 @@ class VehicleModel:
     def parameters(self) -> Array:
         """Values in the order of host.equations.NAMES."""
         return np.array([self.values[name] for name in NAMES])
-
-
-def program_version() -> str:
-    """Version of the installed distribution."""
-    return version("auv-mils")
 
 
 def write_model(model: VehicleModel, path: Path) -> None:

@@ -15,6 +15,7 @@ from host.equations import NAMES, STATES, derivative, outputs
 from host.recording import Array, Recording
 
 NX, NP = len(STATES), len(NAMES)
+MOST_SUBSTEPS = 8  # slow records show no modes faster than their sampling: finer steps would resolve nothing
 LONGEST_SUBSTEP = 0.05  # s; for a 10 rad/s mode the error of one sub-step is below 3e-4 of its change
 
 
@@ -44,7 +45,7 @@ def inputs_of(recording: Recording) -> Inputs:
         drive=np.vstack([recording.rudder, speed, known, intervals]),
         measured=np.where(present, measured, 0.0),
         present=present.astype(float),
-        substeps=max(1, int(np.ceil(intervals.max() / LONGEST_SUBSTEP))),
+        substeps=int(np.ceil(recording.step / max(LONGEST_SUBSTEP, recording.step / MOST_SUBSTEPS))),
     )
 
 

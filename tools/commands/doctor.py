@@ -16,8 +16,6 @@ from pathlib import Path
 from bridge.errors import BridgeError
 from host.vehicle import Vehicle, read_vehicle
 
-HELP = "say what link, device, dependency or compiler is missing and how to get it"
-OLDEST_PYTHON = (3, 11)
 CORE = {
     "numpy": "numpy",
     "pymavlink": "pymavlink",

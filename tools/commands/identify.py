@@ -5,8 +5,6 @@ from pathlib import Path
 
 from tools.bench import joint_or_each, load_vehicle, progress, read_all
 
-HELP = "identify a vehicle from its recordings (bench)"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(

@@ -6,8 +6,6 @@ from pathlib import Path
 
 from tools.bench import load_vehicle, read_all
 
-HELP = "score a model's free run against a recording"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=Path, metavar="MODEL.json")

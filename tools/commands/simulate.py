@@ -5,8 +5,6 @@ from pathlib import Path
 
 from tools.bench import load_vehicle, read_all
 
-HELP = "free run of a model on the rudder of a recording"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=Path, metavar="MODEL.json")
