@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from tools.sitl.can_vehicle import CanVehicle, load_dbc, open_bus
+from tools.sitl.errors import TransportError
 from tools.sitl.recording import record
 from tools.sitl.scenario import Can, Scenario, load
 from tools.sitl.sensors import Channel, Sensors
 from tools.sitl.track import Track
-from tools.sitl.transport import TransportError
 
 DEFAULT_DBC = Path(__file__).parents[2] / "bridge" / "default.dbc"
 OWN_DBC = """VERSION ""

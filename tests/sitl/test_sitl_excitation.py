@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tools.sitl.errors import ScenarioError
 from tools.sitl.excitation import Commander, Excitation, make_law
 from tools.sitl.plant import stream
 from tools.sitl.recording import sail
 from tools.sitl.scenario import Scenario, Start, load
-from tools.sitl.strict import ScenarioError
 
 
 def command(duration_s: float = 60.0, seed: int = 1, **settings: object) -> np.ndarray:

@@ -8,12 +8,12 @@ import pytest
 from scipy.linalg import expm
 
 from tools.sitl.effects import Effects, InternalWave, SurfaceWaves, Timed
+from tools.sitl.errors import ScenarioError
 from tools.sitl.excitation import Excitation
 from tools.sitl.hull import GRAVITY, Hull
 from tools.sitl.plant import Plant
 from tools.sitl.recording import sail
 from tools.sitl.scenario import Scenario, Start, load
-from tools.sitl.strict import ScenarioError
 
 STILL = Excitation(program="none")
 SIZES = {

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from tools.sitl.errors import ScenarioError
 from tools.sitl.scenario import SCENARIOS, Scenario, load, parse
-from tools.sitl.strict import ScenarioError
 
 SHIPPED = sorted(path.stem for path in SCENARIOS.glob("*.toml"))
 

@@ -6,7 +6,8 @@ import tty
 
 import pytest
 
-from tools.sitl.transport import SCHEMES, TcpServer, Transport, TransportError, Udp, open_transport
+from tools.sitl.errors import TransportError
+from tools.sitl.transport import SCHEMES, TcpServer, Transport, Udp, open_transport
 
 
 def receive(transport: Transport, size: int) -> bytes:

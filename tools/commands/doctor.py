@@ -16,6 +16,7 @@ from pathlib import Path
 from bridge.errors import BridgeError
 from host.vehicle import Vehicle, read_vehicle
 
+OLDEST_PYTHON = (3, 11)
 CORE = {
     "numpy": "numpy",
     "pymavlink": "pymavlink",

@@ -1,12 +1,10 @@
 """`mils sitl`: a simulated AUV that speaks MAVLink or CAN, or fills a recording."""
 
 import argparse
-import signal
 import sys
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from itertools import count
 from math import degrees, isfinite, nan
@@ -15,8 +13,7 @@ from pathlib import Path
 import bridge
 from bridge.errors import LinkError
 from host.errors import ConfigError
-from tools.sitl.can_vehicle import CanVehicle, open_bus
-from tools.sitl.mavlink_vehicle import MavlinkVehicle
+from tools.sitl.errors import ScenarioError, TransportError
 from tools.sitl.plant import Instant
 from tools.sitl.recording import (
     COLUMNS,
@@ -30,10 +27,9 @@ from tools.sitl.recording import (
 )
 from tools.sitl.scenario import SCENARIOS, Scenario, load
 from tools.sitl.schedule import Pace
-from tools.sitl.strict import ScenarioError
 from tools.sitl.track import Track
-from tools.sitl.transport import TransportError, open_transport
 from tools.sitl.voyage import Vehicle, sail_live
+from tools.stop_signals import stop_signals
 
 HELP = "a simulated AUV that speaks MAVLink or CAN"
 DEFAULT_DBC = Path(bridge.__file__).parent / "default.dbc"
@@ -97,17 +93,23 @@ def _fill(scenario: Scenario, seed: int, args: argparse.Namespace) -> int:
 
 def _speak(scenario: Scenario, seed: int, args: argparse.Namespace) -> int:
     """Runs on a link until the time is over or somebody stops it."""
-    with ExitStack() as stack, _stop_signals() as stop:
+    with ExitStack() as stack, stop_signals() as stop:
         truth = _truth_writer(scenario, args.truth, stack)
         track = Track(scenario, seed, truth)
         note = _note_writer(args.record, stack)
         vehicle: Vehicle
+        # What a link needs is loaded with it, so that `mils doctor` starts where pymavlink is missing.
         if args.link.startswith("can:"):
+            from tools.sitl.can_vehicle import CanVehicle, open_bus
+
             bus = open_bus(args.link)
             stack.callback(bus.shutdown)
             dbc = Path(scenario.folder) / scenario.can.dbc if scenario.can.dbc else DEFAULT_DBC
             vehicle = CanVehicle(scenario, seed, track, bus, dbc, note)
         else:
+            from tools.sitl.mavlink_vehicle import MavlinkVehicle
+            from tools.sitl.transport import open_transport
+
             transport = open_transport(args.link)
             stack.callback(transport.close)
             vehicle = MavlinkVehicle(scenario, seed, track, transport, note)
@@ -149,23 +151,6 @@ class _Status:
     def finish(self) -> None:
         if not self.quiet:
             print(f"\r{self.line()}\033[K" if self.is_terminal else self.line(), flush=True)
-
-
-@contextmanager
-def _stop_signals() -> Iterator[threading.Event]:
-    """An event that SIGINT and SIGTERM set; the handlers are put back afterwards."""
-    stop = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield stop
-        return
-    before = {
-        number: signal.signal(number, lambda *_: stop.set()) for number in (signal.SIGINT, signal.SIGTERM)
-    }
-    try:
-        yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _truth_writer(scenario: Scenario, path: Path | None, stack: ExitStack) -> Callable[[Instant], None]:

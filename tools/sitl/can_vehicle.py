@@ -1,5 +1,6 @@
 """The simulated vehicle on a CAN bus, encoded by cantools after a DBC file."""
 
+import logging
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -8,26 +9,45 @@ from typing import Any
 import can
 import cantools
 
+from tools.sitl.errors import TransportError
 from tools.sitl.plant import stream
 from tools.sitl.recording import COLUMNS
 from tools.sitl.scenario import Scenario
 from tools.sitl.schedule import Timetable
 from tools.sitl.sensors import Instrument
 from tools.sitl.track import Track
-from tools.sitl.transport import TransportError
+
+# python-can reports through logging what it then raises.
+logging.getLogger("can").addHandler(logging.NullHandler())
+
+_MULTICAST_GROUP = "239.74.163.2"  # python-can's default
 
 Note = Callable[[float, str, float], None]
 
 
 def open_bus(url: str) -> can.BusABC:
-    """can:INTERFACE:CHANNEL, as python-can names them. Raises TransportError."""
-    parts = url.split(":", 2)
-    if len(parts) != 3 or parts[0] != "can" or not parts[1] or not parts[2]:
+    """can:INTERFACE:CHANNEL with python-can's names, can:slcan:DEVICE:BITRATE, can:socketcand:HOST:PORT:CHANNEL,
+    can:udp_multicast[:GROUP]. Raises TransportError."""
+    scheme, _, rest = url.partition(":")
+    interface, _, channel = rest.partition(":")
+    if scheme != "can" or not interface or not (channel or interface == "udp_multicast"):
         raise TransportError(f"link must be can:INTERFACE:CHANNEL (got {url!r})")
     try:
-        return can.Bus(interface=parts[1], channel=parts[2])
-    except (can.CanError, OSError, ImportError, ValueError, NotImplementedError) as error:
-        raise TransportError(f"link {url} cannot be opened: {error}") from error
+        return can.Bus(interface=interface, **_bus_arguments(interface, channel))
+    except Exception as error:  # every backend of python-can has classes of its own
+        raise TransportError(f"link {url} cannot be opened: {' '.join(str(error).split())}") from error
+
+
+def _bus_arguments(interface: str, channel: str) -> dict[str, Any]:
+    name, colon, number = channel.rpartition(":")
+    if interface == "udp_multicast":
+        return {"channel": channel or _MULTICAST_GROUP}
+    if interface == "socketcand":
+        host, port, bus = channel.split(":")
+        return {"host": host, "port": int(port), "channel": bus}
+    if colon and number.isdigit():
+        return {"channel": name, "bitrate": int(number)}
+    return {"channel": channel}
 
 
 def load_dbc(path: Path) -> Any:

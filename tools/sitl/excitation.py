@@ -10,7 +10,8 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from tools.sitl.strict import ScenarioError, require
+from tools.sitl.errors import ScenarioError
+from tools.sitl.strict import require
 
 Program = Literal["none", "multistep", "3211", "multisine", "sine", "doublets", "depth_steps", "csv"]
 

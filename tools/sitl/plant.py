@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from tools.sitl.actuator import Actuator
+from tools.sitl.errors import ScenarioError
 from tools.sitl.excitation import Commander, make_law
 from tools.sitl.hull import Hydrodynamics, Motion
 from tools.sitl.scenario import Scenario
 from tools.sitl.sea import Sea
 from tools.sitl.sensors import DepthAndPitchSensing
-from tools.sitl.strict import ScenarioError
 
 
 def stream(seed: int, name: str) -> np.random.Generator:

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Literal
 
 from tools.sitl.effects import REALISTIC, Effects
+from tools.sitl.errors import ScenarioError
 from tools.sitl.excitation import Excitation
 from tools.sitl.hull import Hull
 from tools.sitl.sensors import Sensors
-from tools.sitl.strict import ScenarioError, build, require
+from tools.sitl.strict import build, require
 
 SCENARIOS = Path(__file__).parent / "scenarios"
 

@@ -6,11 +6,9 @@ import typing
 from dataclasses import MISSING, Field, fields, is_dataclass
 from typing import Any, Literal, TypeVar
 
+from tools.sitl.errors import ScenarioError
+
 T = TypeVar("T")
-
-
-class ScenarioError(ValueError):
-    """A scenario breaks a rule; the message is one line: name, rule, what was found."""
 
 
 def require(holds: bool, name: str, rule: str, got: object) -> None:

@@ -8,11 +8,9 @@ from typing import Protocol
 
 import serial
 
+from tools.sitl.errors import TransportError
+
 _CHUNK = 65536
-
-
-class TransportError(Exception):
-    """The link cannot be opened or has gone; the message is one line."""
 
 
 class Transport(Protocol):
