@@ -27,6 +27,7 @@ LOWER = np.array([parameter.lower for parameter in PARAMETERS])
 UPPER = np.array([parameter.upper for parameter in PARAMETERS])
 INITIAL_STATE_PRIOR = np.array([1.0, 1.0, 1.0, 100.0])  # std of w, q, theta, zeta; keeps short dives solvable
 SMALLEST_NOISE = np.array(
+NOISE_FREE = 4.0 * SMALLEST_NOISE  # what is left of noise-free data is the integration error
     [1e-10, 1e-8]
 )  # rad^2, m^2: below any sensor; noise-free data must not divide by zero
 
@@ -94,7 +95,8 @@ def fit_maximum_likelihood(
         on_progress("output error")
         candidates.append(_output_error(_Point(parameters, initial, np.zeros(4)), inputs, free))
     best = max(candidates, key=lambda fit: fit.log_likelihood)
-    if noise_model == "output_error" or (noise_model == "auto" and all(is_white(e) for e in best.whitened)):
+    nothing_left = all(is_white(e) for e in best.whitened) or bool((best.noise[:2] < NOISE_FREE).all())
+    if noise_model == "output_error" or (noise_model == "auto" and nothing_left):
         return best
     on_progress("filter error")
     filtered = _filter_error(best, inputs, free)
