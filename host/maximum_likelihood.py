@@ -26,10 +26,9 @@ Mask = NDArray[np.bool_]
 LOWER = np.array([parameter.lower for parameter in PARAMETERS])
 UPPER = np.array([parameter.upper for parameter in PARAMETERS])
 INITIAL_STATE_PRIOR = np.array([1.0, 1.0, 1.0, 100.0])  # std of w, q, theta, zeta; keeps short dives solvable
-SMALLEST_NOISE = np.array(
+# rad^2, m^2: below any sensor, so that noise-free data divide by no zero
+SMALLEST_NOISE = np.array([1e-10, 1e-8])
 NOISE_FREE = 4.0 * SMALLEST_NOISE  # what is left of noise-free data is the integration error
-    [1e-10, 1e-8]
-)  # rad^2, m^2: below any sensor; noise-free data must not divide by zero
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
