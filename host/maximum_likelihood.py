@@ -27,8 +27,8 @@ LOWER = np.array([parameter.lower for parameter in PARAMETERS])
 UPPER = np.array([parameter.upper for parameter in PARAMETERS])
 INITIAL_STATE_PRIOR = np.array([1.0, 1.0, 1.0, 100.0])  # std of w, q, theta, zeta; keeps short dives solvable
 # rad^2, m^2: below any sensor, so that noise-free data divide by no zero
-SMALLEST_NOISE = np.array([1e-10, 1e-8])
-NOISE_FREE = 4.0 * SMALLEST_NOISE  # what is left of noise-free data is the integration error
+SMALLEST_NOISE = np.array([1e-12, 1e-10])
+NOISE_FREE = 100.0 * SMALLEST_NOISE  # what is left of noise-free data is the integration error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
