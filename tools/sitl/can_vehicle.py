@@ -26,8 +26,10 @@ Note = Callable[[float, str, float], None]
 
 
 def open_bus(url: str) -> can.BusABC:
-    """can:INTERFACE:CHANNEL with python-can's names, can:slcan:DEVICE:BITRATE, can:socketcand:HOST:PORT:CHANNEL,
-    can:udp_multicast[:GROUP]. Raises TransportError."""
+    """A bus by its address, INTERFACE as python-can names it. Raises TransportError.
+
+    can:INTERFACE:CHANNEL[:BITRATE]    can:socketcand:HOST:PORT:CHANNEL    can:udp_multicast[:GROUP]
+    """
     scheme, _, rest = url.partition(":")
     interface, _, channel = rest.partition(":")
     if scheme != "can" or not interface or not (channel or interface == "udp_multicast"):
