@@ -29,7 +29,10 @@ def main() -> int:
     journal = folder / "dive.jsonl"
 
     port = _free_port()
-    print(f"1. A simulated dive at {args.speed:g} times real time, MAVLink over UDP port {port}; live:", flush=True)
+    print(
+        f"1. A simulated dive at {args.speed:g} times real time, MAVLink over UDP port {port}; live:",
+        flush=True,
+    )
     live = subprocess.Popen(
         [*MILS, "run", str(EXAMPLE), "--link", f"udp:127.0.0.1:{port}"]
         + ["--journal", str(journal), "--no-state"]
