@@ -14,7 +14,6 @@ import time
 from pathlib import Path
 
 EXAMPLE = Path(__file__).parent / "examples" / "demo.toml"
-MILS = [sys.executable, "-m", "tools.cli"]
 
 
 def main() -> int:
@@ -34,14 +33,19 @@ def main() -> int:
         flush=True,
     )
     live = subprocess.Popen(
-        [*MILS, "run", str(EXAMPLE), "--link", f"udp:127.0.0.1:{port}"]
-        + ["--journal", str(journal), "--no-state"]
+        _mils("run", EXAMPLE, "--no-state", link=f"udp:127.0.0.1:{port}", journal=journal),
     )
     try:
         _wait_until_bound(port, live)
         vehicle = subprocess.run(
-            [*MILS, "sitl", "--scenario", args.scenario, "--speed", str(args.speed), "--quiet"]
-            + ["--link", f"udpout:127.0.0.1:{port}", "--truth", str(folder / "truth.csv")],
+            _mils(
+                "sitl",
+                "--quiet",
+                scenario=args.scenario,
+                speed=args.speed,
+                link=f"udpout:127.0.0.1:{port}",
+                truth=folder / "truth.csv",
+            ),
             check=False,
         )
     finally:
@@ -52,11 +56,15 @@ def main() -> int:
         return vehicle.returncode or live.returncode
 
     print("\n2. The same dive on the bench, from the journal:", flush=True)
-    bench = subprocess.run(
-        [*MILS, "identify", str(journal), "--vehicle", str(EXAMPLE), "--out", str(folder)], check=False
-    )
+    bench = subprocess.run(_mils("identify", journal, vehicle=EXAMPLE, out=folder), check=False)
     print(f"\nOpen {os.path.abspath(folder / 'report.html')}")
     return bench.returncode
+
+
+def _mils(*words: object, **options: object) -> list[str]:
+    """The command line of `mils`."""
+    named = [text for name, value in options.items() for text in (f"--{name}", str(value))]
+    return [sys.executable, "-m", "tools.cli", *map(str, words), *named]
 
 
 def _free_port() -> int:
