@@ -28,7 +28,7 @@ def test_a_glider_is_identified_and_its_battery_moment_called_open(tmp_path: Pat
 def test_an_independent_simulator_is_identified_and_physics_left_out_is_admitted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """REMUS 100: Mq/Iy -1.446, Mtheta/Iy -0.815, Mdelta u^2/Iy -2.066; its plane lag and u q are not in the model."""
+    """REMUS 100: Mq/Iy -1.446, Mtheta/Iy -0.815, Mdelta u^2/Iy -2.066; plane lag and u q left out."""
     code, parameters = identify(tmp_path, DATA / "simulators" / "pvs_remus100__3211.csv")
     assert code == 0
     assert parameters["a2"]["value"] == pytest.approx(-1.446, rel=0.2)
