@@ -6,6 +6,8 @@ from math import isnan, nan
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from tools.sitl.mavlink_vehicle import MavlinkVehicle
@@ -266,3 +268,28 @@ def test_frames_are_determined_by_the_seed():
     scenario = load("rough_sea")
     first, again, other = (bytes(Run(scenario, seed).until(20.0).wire.out) for seed in (1, 1, 2))
     assert first == again != other
+
+
+@given(st.data())
+@settings(max_examples=60, deadline=None)
+def test_bytes_from_the_link_never_raise(data):
+    """Pure noise, and requests damaged anywhere."""
+    run = Run(load("linear_noise_free"))
+    request = run.ground.command_long_encode(1, 1, 511, 0, 30, 20_000, 0, 0, 0, 0, 0).pack(run.ground)
+    damaged = bytearray(request * 3)
+    for at in data.draw(st.lists(st.integers(0, len(damaged) - 1), max_size=4)):
+        damaged[at] = data.draw(st.integers(0, 255))
+    for piece in (data.draw(st.binary(max_size=300)), bytes(damaged), data.draw(st.binary(max_size=300))):
+        run.wire.inbox = piece
+        run.vehicle.listen(0.0)
+
+
+@given(st.floats(width=32), st.floats(width=32), st.integers(0, 65535))
+@settings(max_examples=60, deadline=None)
+def test_any_request_gets_one_answer(number, interval_us, command):
+    run = Run(load("linear_noise_free"))
+    answers = run.ask(run.ground.command_long_encode(1, 1, command, 0, number, interval_us, 0, 0, 0, 0, 0))
+    assert [answer.get_type() for answer in answers] == ["COMMAND_ACK"]
+    answers = run.ask(run.ground.command_long_encode(1, 1, 511, 0, number, interval_us, 0, 0, 0, 0, 0))
+    assert [answer.get_type() for answer in answers] == ["COMMAND_ACK"]
+    run.until(0.2)

@@ -3,9 +3,12 @@
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tools.sitl.errors import ScenarioError
 from tools.sitl.scenario import SCENARIOS, Scenario, load, parse
+from tools.sitl.strict import build
 
 SHIPPED = sorted(path.stem for path in SCENARIOS.glob("*.toml"))
 
@@ -96,3 +99,23 @@ def test_message_names_the_file(tmp_path):
     path.write_text("seed = -1")
     with pytest.raises(ScenarioError, match=r"x\.toml: seed must be >= 0"):
         load(str(path))
+
+
+TABLES = st.recursive(
+    st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5)),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(
+            st.sampled_from(["seed", "effects", "start", "speed", "size", "sensors", "depth", "x"]), inner
+        )
+    ),
+    max_leaves=8,
+)
+
+
+@given(TABLES)
+def test_any_table_is_a_scenario_or_refused(table):
+    try:
+        assert isinstance(build(Scenario, table), Scenario)
+    except ScenarioError as error:
+        assert "\n" not in str(error)  # noqa: PT017

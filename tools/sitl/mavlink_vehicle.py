@@ -160,7 +160,7 @@ class MavlinkVehicle:
         """Result of a command; only the interval of a known message can be set, and not below 5 ms."""
         if message.command != mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
             return int(mavlink.MAV_RESULT_UNSUPPORTED)
-        wanted = mavlink.mavlink_map.get(int(message.param1))
+        wanted = mavlink.mavlink_map.get(message.param1)
         interval_us = message.param2
         if wanted is None or wanted.msgname not in self.timetables:
             return int(mavlink.MAV_RESULT_FAILED)

@@ -1,6 +1,5 @@
 """Tables of a TOML file to frozen dataclasses, without tolerance for slips."""
 
-import math
 import types
 import typing
 from dataclasses import MISSING, Field, fields, is_dataclass
@@ -9,6 +8,7 @@ from typing import Any, Literal, TypeVar
 from tools.sitl.errors import ScenarioError
 
 T = TypeVar("T")
+_LARGEST = 1e300  # also of integers, which have no end in TOML
 
 
 def require(holds: bool, name: str, rule: str, got: object) -> None:
@@ -61,7 +61,7 @@ def _value(kind: Any, value: object, where: str) -> object:
             _value(item, entry, f"{where}[{i}]") for i, entry in enumerate(typing.cast(list[object], value))
         )
     if kind is float and isinstance(value, int | float) and not isinstance(value, bool):
-        require(math.isfinite(value), where, "be finite", value)
+        require(abs(value) <= _LARGEST, where, "be finite", value)
         return float(value)
     require(type(value) is kind, where, f"be of type {kind.__name__}", value)
     return value
