@@ -53,6 +53,7 @@ def test_relative_files_are_looked_for_beside_the_scenario(tmp_path):
         ('duration_s = "long"', "duration_s must be of type float"),
         ("duration_s = true", "duration_s must be of type float"),
         ("duration_s = nan", "duration_s must be finite"),
+        ("duration_s = 1" + 400 * "0", "duration_s must be finite"),
         ("duration_s = -1", "duration_s must be >= 0 s"),
         ("seed = 1.5", "seed must be of type int"),
         ("seed = -1", "seed must be >= 0"),
