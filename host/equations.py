@@ -1,17 +1,22 @@
-"""The vehicle's continuous-time equations, written once as CasADi expressions.
+"""The vehicle's continuous-time equations, written once in CasADi, with slots for what is left out.
 
-    w'     = a1 w + b1 delta + heave_offset
-    q'     = a2 q + a3 theta + b2 delta + pitch_offset
+    w'     = a1 w + b1 delta + heave_offset            heave velocity, m/s
+    q'     = a2 q + a3 theta + b2 delta + pitch_offset pitch rate, rad/s
     theta' = q
     zeta'  = w - u theta,    u = measured speed, or the constant u0 where no speed is measured
 
 Source: Yuan et al., J. Mar. Sci. Eng. 2025, 13, 1489, Eq. 1-3; the two offsets stand for an imperfect trim.
+An effect (host.catalogue) adds its term to the slot of the chain where it acts.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
 
 import casadi as ca
 
+Slot = Literal["heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment"]
 STATES = ("w", "q", "theta", "zeta")
 
 
@@ -39,18 +44,173 @@ PARAMETERS = (
 NAMES = tuple(parameter.name for parameter in PARAMETERS)
 
 
-def derivative(x: ca.SX, parameters: ca.SX, rudder: ca.SX, speed: ca.SX, is_speed_known: ca.SX) -> ca.SX:
-    """State derivative of [w, q, theta, zeta], SI; `parameters` in the order of NAMES; the flag is 0 or 1."""
-    w, q, theta, _ = ca.vertsplit(x)
-    a1, a2, a3, b1, b2, u0, heave_offset, pitch_offset = ca.vertsplit(parameters)
-    return ca.vertcat(
-        a1 * w + b1 * rudder + heave_offset,
-        a2 * q + a3 * theta + b2 * rudder + pitch_offset,
-        q,
-        w - (u0 * (1 - is_speed_known) + speed * is_speed_known) * theta,
-    )
+@dataclass(slots=True, kw_only=True)
+class Chain:
+    """The symbols of one instant while effects add their terms.
+
+    p            parameters by name
+    extra        states of effects by name
+    speed        u, m/s; `speed_ratio` is u / u0: damping goes with it, plane force with its square
+    command      rad, the plane as commanded; `earlier` the commands of the rows before, newest first
+    plane        rad, the angle at which the plane acts
+    heave, pitch, climb   terms added to w' (m/s^2), q' (rad/s^2), zeta' (m/s)
+    sensed_pitch, sensed_depth   what the sensors give
+    """
+
+    p: dict[str, ca.SX]
+    w: ca.SX
+    q: ca.SX
+    theta: ca.SX
+    zeta: ca.SX
+    extra: dict[str, ca.SX]
+    time: ca.SX
+    interval: ca.SX
+    speed: ca.SX
+    speed_ratio: ca.SX
+    command: ca.SX
+    earlier: list[ca.SX]
+    plane: ca.SX
+    heave: ca.SX = field(default_factory=lambda: ca.SX(0))
+    pitch: ca.SX = field(default_factory=lambda: ca.SX(0))
+    climb: ca.SX = field(default_factory=lambda: ca.SX(0))
+    rates: dict[str, ca.SX] = field(default_factory=dict)
+    sensed_pitch: ca.SX = field(default_factory=lambda: ca.SX(0))
+    sensed_depth: ca.SX = field(default_factory=lambda: ca.SX(0))
 
 
-def outputs(x: ca.SX) -> ca.SX:
-    """What the sensors see: [pitch, depth]."""
-    return ca.vertcat(x[2], x[3])
+Term = Callable[[Chain], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effect:
+    """Physics that the base model leaves out: one entry of the catalogue.
+
+    force     adds to heave, pitch, climb or the rate of its own state; evaluated within each sub-step
+    command   changes the command before the actuator, once a sub-step
+    actuator  (chain, held angle, sub-step s) -> (mean angle over the sub-step, next held angle);
+              needs a state of its own, which starts at the command
+    plane     changes the angle at which the plane acts
+    sense     changes what the sensors give
+    state     name of the state the effect brings with it, and `initial`, its value at the first row
+    probes    start values of its parameters to try; `scales` fits them to a recording
+    lags      whether it looks at earlier commands
+    """
+
+    name: str
+    slot: Slot
+    parameters: tuple[Parameter, ...]
+    sentence: str
+    equation: str
+    manoeuvre: str
+    probes: tuple[tuple[float, ...], ...]
+    scales: tuple[str, ...] = ()
+    force: Term | None = None
+    command: Term | None = None
+    actuator: Callable[[Chain, ca.SX, ca.SX], tuple[ca.SX, ca.SX]] | None = None
+    plane: Term | None = None
+    sense: Term | None = None
+    state: str | None = None
+    initial: Callable[[Chain], ca.SX] | None = None
+    lags: bool = False
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Base equations with a set of effects, in the catalogue's order (the order of the chain).
+
+    Its parameters are those of the base, then those of each effect.
+    """
+
+    effects: tuple[Effect, ...] = ()
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return PARAMETERS + tuple(p for effect in self.effects for p in effect.parameters)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @cached_property
+    def states(self) -> tuple[str, ...]:
+        return STATES + tuple(effect.state for effect in self.effects if effect.state is not None)
+
+    @property
+    def needs_lags(self) -> bool:
+        return any(effect.lags for effect in self.effects)
+
+    def chain(self, x: ca.SX, parameters: ca.SX, drive: ca.SX, time: ca.SX) -> Chain:
+        """The symbols at one instant; `drive` as in host.propagate.Inputs."""
+        p = dict(zip(self.names, ca.vertsplit(parameters), strict=True))
+        w, q, theta, zeta, *extra = ca.vertsplit(x)
+        rudder, measured, is_known, interval, _, *earlier = ca.vertsplit(drive)
+        speed = p["u0"] * (1 - is_known) + measured * is_known
+        return Chain(
+            p=p,
+            w=w,
+            q=q,
+            theta=theta,
+            zeta=zeta,
+            extra=dict(zip(self.states[len(STATES) :], extra, strict=True)),
+            time=time,
+            interval=interval,
+            speed=speed,
+            speed_ratio=ca.SX(1),
+            command=rudder,
+            earlier=earlier,
+            plane=rudder,
+            sensed_pitch=theta,
+            sensed_depth=zeta,
+        )
+
+    def derivative(self, chain: Chain) -> ca.SX:
+        """State derivative for the chain's plane angle; states of actuators do not move here."""
+        p = chain.p
+        for effect in self.effects:
+            if effect.force is not None:
+                effect.force(chain)
+        ratio = chain.speed_ratio
+        own = [chain.rates.get(name, ca.SX(0)) for name in self.states[len(STATES) :]]
+        return ca.vertcat(
+            p["a1"] * ratio * chain.w + p["b1"] * ratio**2 * chain.plane + p["heave_offset"] + chain.heave,
+            p["a2"] * ratio * chain.q
+            + p["a3"] * chain.theta
+            + p["b2"] * ratio**2 * chain.plane
+            + p["pitch_offset"]
+            + chain.pitch,
+            chain.q,
+            chain.w - chain.speed * chain.theta + chain.climb,
+            *own,
+        )
+
+    def actuate(self, chain: Chain, substep: ca.SX) -> dict[str, ca.SX]:
+        """Sets the chain's plane angle for one sub-step; gives the next states of the actuators."""
+        moved = {}
+        for effect in self.effects:
+            if effect.command is not None:
+                effect.command(chain)
+        chain.plane = chain.command
+        for effect in self.effects:
+            if effect.actuator is not None and effect.state is not None:
+                chain.plane, moved[effect.state] = effect.actuator(chain, chain.extra[effect.state], substep)
+        for effect in self.effects:
+            if effect.plane is not None:
+                effect.plane(chain)
+        return moved
+
+    def outputs(self, chain: Chain) -> ca.SX:
+        """What the sensors see: [pitch, depth]."""
+        for effect in self.effects:
+            if effect.sense is not None:
+                effect.sense(chain)
+        return ca.vertcat(chain.sensed_pitch, chain.sensed_depth)
+
+    def initial(self, x0: ca.SX, parameters: ca.SX, drive: ca.SX) -> ca.SX:
+        """All states at the first row from the four of the base."""
+        count = len(self.states) - len(STATES)
+        chain = self.chain(ca.vertcat(x0, ca.SX(count, 1)), parameters, drive, ca.SX(0))
+        own = [effect.initial(chain) for effect in self.effects if effect.initial is not None]
+        return ca.vertcat(x0, *own)
+
+
+BASE = Structure()

@@ -9,7 +9,7 @@ import numpy as np
 
 from host.equations import NAMES
 from host.identify_car import car_least_squares, run_estimator
-from host.maximum_likelihood import LOWER, UPPER, Fit, fit_maximum_likelihood
+from host.maximum_likelihood import Fit, fit_maximum_likelihood
 from host.model import VehicleModel
 from host.predict import Prediction, predict
 from host.recording import Array, Recording
@@ -177,14 +177,10 @@ def _notes(fit: Fit | None, method: Method) -> list[str]:
             "corrected for it."
         )
     at_bound = [
-        name
-        for name, value, free, low, high in _with_bounds(fit)
-        if free and (value <= low * (1 + 1e-9) or value >= high)
+        parameter.name
+        for parameter, value, is_free in zip(fit.structure.parameters, fit.parameters, fit.free, strict=True)
+        if is_free and (value <= parameter.lower * (1 + 1e-9) or value >= parameter.upper)
     ]
     if at_bound:
         notes.append(f"At the edge of what is physically possible: {', '.join(at_bound)}.")
     return notes
-
-
-def _with_bounds(fit: Fit) -> list[tuple[str, float, bool, float, float]]:
-    return list(zip(NAMES, fit.parameters, fit.free, LOWER, UPPER, strict=True))

@@ -39,13 +39,13 @@ def data_uri(figure: Any) -> str:
 
 def free_run_plot(prediction: Prediction) -> str:
     """Depth, pitch and rudder over time: what was measured against the free run, and what is left over."""
-    recording, states = prediction.recording, prediction.states
+    recording, (pitch, depth) = prediction.recording, prediction.outputs
     figure, axes = plt.subplots(
         5, 1, figsize=(9.5, 8.2), sharex=True, gridspec_kw={"height_ratios": [3, 1.1, 3, 1.1, 1.3]}
     )
     channels = [
-        (recording.depth, states[3], "depth, m"),
-        (np.degrees(recording.pitch), np.degrees(states[2]), "pitch, deg"),
+        (recording.depth, depth, "depth, m"),
+        (np.degrees(recording.pitch), np.degrees(pitch), "pitch, deg"),
     ]
     for row, (measured, simulated, label) in enumerate(channels):
         main, rest = axes[2 * row], axes[2 * row + 1]

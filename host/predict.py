@@ -6,7 +6,7 @@ import numpy as np
 
 from host.errors import RecordingError
 from host.model import VehicleModel
-from host.propagate import NP, Inputs, free_run, innovations, inputs_of
+from host.propagate import Inputs, free_run, innovations, inputs_of
 from host.recording import Array, Recording
 
 SETTLING_SPAN = 5.0  # s from the start, from which alone the initial state is estimated
@@ -35,10 +35,10 @@ class Score:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prediction:
-    """States (4, N) of the free run beside the recording, and the score."""
+    """Outputs pitch, depth (2, N) of the free run beside the recording, and the score."""
 
     recording: Recording
-    states: Array
+    outputs: Array
     score: Score
 
 
@@ -49,8 +49,8 @@ def predict(model: VehicleModel, recording: Recording) -> Prediction:
     if opening.time.size < 4:
         opening = recording.between(recording.time[0], recording.time[min(4, recording.time.size - 1)])
     initial = estimate_initial_state(model.parameters, opening, inputs)
-    states = free_run(model.parameters, initial, inputs)
-    return Prediction(recording=recording, states=states, score=score(states, [recording]))
+    run = free_run(model.parameters, initial, inputs)
+    return Prediction(recording=recording, outputs=run.outputs, score=score(run.outputs, [recording]))
 
 
 def estimate_initial_state(parameters: Array, opening: Recording, whole: Inputs) -> Array:
@@ -61,6 +61,7 @@ def estimate_initial_state(parameters: Array, opening: Recording, whole: Inputs)
     """
     rows = opening.time.size
     inputs = Inputs(
+        structure=whole.structure,
         drive=whole.drive[:, :rows],
         measured=whole.measured[:, :rows],
         present=whole.present[:, :rows],
@@ -79,19 +80,19 @@ def estimate_initial_state(parameters: Array, opening: Recording, whole: Inputs)
     x = centre.copy()
     for _ in range(3):
         error, sensitivity = innovations(parameters, x, inputs)
-        S = sensitivity[:, NP:]
+        S = sensitivity[:, parameters.size :]
         H = np.einsum("oik,o,ojk->ij", S, weight, S) + prior
         g = np.einsum("oik,o,ok->i", S, weight, error) + prior @ (centre - x)
         x = x + np.linalg.solve(H, g)
     return x
 
 
-def score(states: Array, recordings: list[Recording]) -> Score:
-    """Scores simulated states (4, N) against what was measured in the recordings, one after the other."""
+def score(outputs: Array, recordings: list[Recording]) -> Score:
+    """Scores simulated pitch and depth (2, N) against what was measured in the recordings, end to end."""
     pitch = np.concatenate([recording.pitch for recording in recordings])
     depth = np.concatenate([recording.depth for recording in recordings])
-    pitch_rmse, pitch_fit, pitch_samples = _channel(pitch, states[2])
-    depth_rmse, depth_fit, depth_samples = _channel(depth, states[3])
+    pitch_rmse, pitch_fit, pitch_samples = _channel(pitch, outputs[0])
+    depth_rmse, depth_fit, depth_samples = _channel(depth, outputs[1])
     return Score(
         depth_rmse_m=depth_rmse,
         pitch_rmse_rad=pitch_rmse,

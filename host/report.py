@@ -127,11 +127,11 @@ def _noise(result: Identification) -> str:
 def _plots(result: Identification) -> list[dict[str, str]]:
     plots = []
     for prediction in (result.held_out or [])[:1]:
-        if np.isfinite(prediction.states).all():
+        if np.isfinite(prediction.outputs).all():
             caption = f"{prediction.recording.name}: free run over the held-out part."
             plots.append({"uri": free_run_plot(prediction), "caption": caption})
     for prediction in result.predictions[:MOST_PLOTS]:
-        if np.isfinite(prediction.states).all():
+        if np.isfinite(prediction.outputs).all():
             caption = f"{prediction.recording.name}: free run over what it was learnt from."
             plots.append({"uri": free_run_plot(prediction), "caption": caption})
     if not plots:

@@ -8,7 +8,7 @@ import numpy as np
 
 from host.model import VehicleModel
 from host.predict import SETTLING_SPAN, estimate_initial_state
-from host.propagate import free_run, inputs_of
+from host.propagate import FreeRun, free_run, inputs_of
 from host.recording import Array, Recording
 
 COLUMNS = ("time_s", "depth_m", "pitch_rad", "rudder_rad", "speed_mps", "pitch_rate_radps", "heave_mps")
@@ -16,10 +16,10 @@ COLUMNS = ("time_s", "depth_m", "pitch_rad", "rudder_rad", "speed_mps", "pitch_r
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Simulation:
-    """States [w, q, theta, zeta] (4, N) at the rows of `time`, with the rudder and speed that drove them."""
+    """A free run at the rows of `time`, with the rudder and speed that drove it."""
 
     time: Array
-    states: Array
+    run: FreeRun
     rudder: Array
     speed: Array
 
@@ -38,7 +38,7 @@ def simulate(model: VehicleModel, recording: Recording) -> Simulation:
     speed = recording.speed if recording.has_speed else np.full(recording.time.size, model.values["u0"])
     return Simulation(
         time=recording.time,
-        states=free_run(model.parameters, initial, inputs),
+        run=free_run(model.parameters, initial, inputs),
         rudder=recording.rudder,
         speed=speed,
     )
@@ -50,6 +50,6 @@ def write_simulation(runs: list[Simulation], path: Path) -> None:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
         for run in runs:
-            w, q, theta, zeta = run.states
-            table = np.column_stack([run.time, zeta, theta, run.rudder, run.speed, q, w])
+            (w, q, *_), (pitch, depth) = run.run.states, run.run.outputs
+            table = np.column_stack([run.time, depth, pitch, run.rudder, run.speed, q, w])
             writer.writerows([f"{value:.9g}" for value in row] for row in table)

@@ -103,7 +103,7 @@ def test_any_ordinary_vehicle_moves_as_identified_without_a_guess(
     recording, states = fly(Dive(vehicle=vehicle, duration=150.0))
     fit = fit_maximum_likelihood([recording])
     # Coefficients may trade against one another where heave hides behind pitch; the motion may not.
-    simulated = free_run(fit.parameters, fit.initial[0], inputs_of(recording))
+    simulated = free_run(fit.parameters, fit.initial[0], inputs_of(recording)).states
     error = np.sqrt(np.mean((simulated - states) ** 2, axis=1))
     assert error[2] < 0.3 * np.deg2rad(0.1)
     assert error[3] < 0.3 * 0.01

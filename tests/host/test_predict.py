@@ -42,7 +42,7 @@ def test_a_free_run_does_not_look_beyond_the_first_five_seconds() -> None:
         pitch=np.where(later, 0.3, recording.pitch),
         depth=np.where(later, 0.0, recording.depth),
     )
-    assert np.array_equal(predict(true_model(), recording).states, predict(true_model(), changed).states)
+    assert np.array_equal(predict(true_model(), recording).outputs, predict(true_model(), changed).outputs)
 
 
 def test_a_wrong_model_scores_worse_in_free_run() -> None:
@@ -62,7 +62,7 @@ def test_no_depth_at_the_start_is_an_error_that_says_so() -> None:
 def test_score_against_a_channel_that_does_not_vary_is_null_in_json() -> None:
     recording, _ = fly(Dive(duration=20.0))
     still = replace(recording, depth=np.full_like(recording.depth, 3.0))
-    document = json.loads(json.dumps(score(np.zeros((4, 200)), [still]).as_json(), allow_nan=False))
+    document = json.loads(json.dumps(score(np.zeros((2, 200)), [still]).as_json(), allow_nan=False))
     assert document["depth_fit_percent"] is None
     assert document["depth_rmse_m"] == pytest.approx(3.0)
 
@@ -71,5 +71,5 @@ def test_simulation_starts_at_rest_where_nothing_was_measured() -> None:
     recording, _ = fly(Dive(duration=20.0))
     nothing = np.full_like(recording.depth, np.nan)
     run = simulate(true_model(), replace(recording, depth=nothing, pitch=nothing))
-    assert np.array_equal(run.states[:, 0], np.zeros(4))
-    assert np.abs(run.states[2]).max() > 0.01
+    assert np.array_equal(run.run.states[:, 0], np.zeros(4))
+    assert np.abs(run.run.states[2]).max() > 0.01

@@ -2,21 +2,21 @@ import numpy as np
 from exact_dive import TABLE_1, Dive, fly
 from scipy.stats import multivariate_normal
 
-from host.propagate import NP, free_run, innovations, inputs_of, kalman_pass
+from host.propagate import free_run, innovations, inputs_of, kalman_pass
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 
 
 def test_free_run_equals_the_matrix_exponential() -> None:
     recording, states = fly(Dive(duration=60.0))
-    simulated = free_run(TRUTH, states[:, 0], inputs_of(recording))
+    simulated = free_run(TRUTH, states[:, 0], inputs_of(recording)).states
     assert np.abs(simulated - states).max() < 2e-6
 
 
 def test_free_run_stays_exact_when_the_speed_varies() -> None:
     speed = np.repeat([2.5, 1.5, 2.0, 3.0], 100)
     recording, states = fly(Dive(duration=40.0, speed=speed))
-    simulated = free_run(TRUTH, states[:, 0], inputs_of(recording))
+    simulated = free_run(TRUTH, states[:, 0], inputs_of(recording)).states
     assert np.abs(simulated - states).max() < 2e-6
 
 
@@ -24,11 +24,14 @@ def test_sensitivities_equal_finite_differences() -> None:
     recording, states = fly(Dive(duration=30.0))
     inputs = inputs_of(recording)
     _, sensitivity = innovations(TRUTH, states[:, 0], inputs)
-    for index in range(NP + 4):
-        change = np.zeros(NP + 4)
+    for index in range(TRUTH.size + 4):
+        change = np.zeros(TRUTH.size + 4)
         change[index] = 1e-6
         moved = [
-            free_run(TRUTH + s * change[:NP], states[:, 0] + s * change[NP:], inputs)[2:] for s in (1.0, -1.0)
+            free_run(
+                TRUTH + s * change[: TRUTH.size], states[:, 0] + s * change[TRUTH.size :], inputs
+            ).outputs
+            for s in (1.0, -1.0)
         ]
         slope = (moved[0] - moved[1]) / 2e-6
         assert np.allclose(sensitivity[:, index], slope, atol=1e-6 * max(1.0, np.abs(slope).max()))
@@ -54,7 +57,7 @@ def test_kalman_likelihood_equals_the_dense_gaussian() -> None:
     for k in range(rows):
         S = np.array([[run.variance[0, k], run.variance[1, k]], [run.variance[1, k], run.variance[2, k]]])
         filtered += multivariate_normal.logpdf(run.error[:, k], cov=S)
-    mean = free_run(TRUTH, states[:, 0], inputs)[2:]
+    mean = free_run(TRUTH, states[:, 0], inputs).outputs
     A = _transition_by_differences(inputs)
     Q = np.diag([noise[2], noise[3], 0.0, 0.0]) * recording.step
     step_noise = A @ (Q / 2) @ A.T + Q / 2
@@ -75,5 +78,5 @@ def test_kalman_likelihood_equals_the_dense_gaussian() -> None:
 
 
 def _transition_by_differences(inputs):  # type: ignore[no-untyped-def]
-    base = free_run(TRUTH, np.zeros(4), inputs)[:, 1]
-    return np.column_stack([free_run(TRUTH, unit, inputs)[:, 1] - base for unit in np.eye(4)])
+    base = free_run(TRUTH, np.zeros(4), inputs).states[:, 1]
+    return np.column_stack([free_run(TRUTH, unit, inputs).states[:, 1] - base for unit in np.eye(4)])

@@ -23,7 +23,7 @@ def run(args: argparse.Namespace) -> int:
     model = read_model(args.model)
     recordings = read_all([args.recording], load_vehicle(args.vehicle), lambda _: None)
     runs = [predict(model, recording) for recording in recordings]
-    total = score(np.hstack([run.states for run in runs]), [run.recording for run in runs])
+    total = score(np.hstack([run.outputs for run in runs]), [run.recording for run in runs])
     print(
         f"depth {total.depth_rmse_m:.4f} m rms ({total.depth_fit_percent:.2f} %), "
         f"pitch {np.degrees(total.pitch_rmse_rad):.4f} deg rms ({total.pitch_fit_percent:.2f} %), "

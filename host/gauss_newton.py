@@ -1,0 +1,99 @@
+"""Damped Gauss-Newton steps on whitened innovations, each recording's initial state eliminated."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from host.equations import Structure
+from host.propagate import NX0
+from host.recording import Array
+
+Mask = NDArray[np.bool_]
+INITIAL_STATE_PRIOR = np.array([1.0, 1.0, 1.0, 100.0])  # std of w, q, theta, zeta; keeps short dives solvable
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A point of the search: parameters, initial states (4,) of each recording, noise (4,)."""
+
+    structure: Structure
+    parameters: Array
+    initial: list[Array]
+    noise: Array
+
+    def with_noise(self, noise: Array) -> "Point":
+        return replace(self, noise=noise)
+
+
+def whiten(error: Array, sensitivity: Array, variance: Array) -> tuple[Array, Array]:
+    """Multiplies by the inverse Cholesky factor of each row's 2 x 2 variance [S11, S12, S22] (3, N)."""
+    l11 = np.sqrt(variance[0])
+    l21 = variance[1] / l11
+    l22 = np.sqrt(variance[2] - l21**2)
+    white, scores = np.empty_like(error), np.empty_like(sensitivity)
+    white[0] = error[0] / l11
+    white[1] = (error[1] - l21 * white[0]) / l22
+    scores[0] = sensitivity[0] / l11
+    scores[1] = (sensitivity[1] - l21 * scores[0]) / l22
+    return white, scores
+
+
+class GaussNewton:
+    """Normal equations of one iteration.
+
+    white  whitened innovations (2, N) and sensitivities (2, parameters + 4, N) of each recording
+    """
+
+    def __init__(self, white: list[tuple[Array, Array]], point: Point, free: Mask) -> None:
+        self.point, self.free = point, free
+        count = int(free.sum())
+        self.H, self.g = np.zeros((count, count)), np.zeros(count)
+        self.own: list[tuple[Array, Array, Array]] = []
+        for error, scores in white:
+            J = np.concatenate([scores[:, : free.size][:, free], scores[:, free.size :]], axis=1)
+            flat = J.transpose(1, 0, 2).reshape(count + NX0, -1)
+            H, g = flat @ flat.T, flat @ error.ravel()
+            self.H += H[:count, :count]
+            self.g += g[:count]
+            Hxx = H[count:, count:] + np.diag(INITIAL_STATE_PRIOR**-2.0)
+            self.own.append((H[:count, count:], Hxx, g[count:]))
+
+    def information(self) -> Array:
+        """Fisher information of the free parameters alone."""
+        reduced = self.H.copy()
+        for Hpx, Hxx, _ in self.own:
+            reduced -= Hpx @ np.linalg.solve(Hxx, Hpx.T)
+        return reduced
+
+    def scores(self, white: list[tuple[Array, Array]]) -> list[Array]:
+        """Sensitivities of the free parameters (2, free, N), the initial states eliminated."""
+        count = self.free.size
+        return [
+            S[:, :count][:, self.free] - np.einsum("px,oxk->opk", np.linalg.solve(Hxx, Hpx.T).T, S[:, count:])
+            for (_, S), (Hpx, Hxx, _) in zip(white, self.own, strict=True)
+        ]
+
+    def trial(self, damping: float) -> Point:
+        """The point one damped step on (Levenberg-Marquardt), inside the parameters' bounds."""
+        reduced, rhs = self.information(), self.g.copy()
+        for Hpx, Hxx, gx in self.own:
+            rhs -= Hpx @ np.linalg.solve(Hxx, gx)
+        scale = np.sqrt(np.maximum(np.diag(self.H), 1e-300))
+        normal = reduced / np.outer(scale, scale) + damping * np.eye(scale.size)
+        try:
+            delta = cho_solve(cho_factor(normal), rhs / scale) / scale
+        except np.linalg.LinAlgError:
+            delta = np.linalg.lstsq(normal, rhs / scale, rcond=1e-12)[0] / scale
+        bounds = self.point.structure.parameters
+        lower = np.array([p.lower for p in bounds])[self.free]
+        upper = np.array([p.upper for p in bounds])[self.free]
+        parameters = self.point.parameters.copy()
+        parameters[self.free] = np.clip(parameters[self.free] + delta, lower, upper)
+        moved = parameters[self.free] - self.point.parameters[self.free]
+        initial = [
+            x0 + np.linalg.solve(Hxx * (1.0 + damping * np.eye(NX0)), gx - Hpx.T @ moved)
+            for x0, (Hpx, Hxx, gx) in zip(self.point.initial, self.own, strict=True)
+        ]
+        return replace(self.point, parameters=parameters, initial=initial)
