@@ -50,7 +50,7 @@ class Chain:
 
     p            parameters by name
     extra        states of effects by name
-    speed        u, m/s; `speed_ratio` is u / u0: damping goes with it, plane force with its square
+    speed        u, m/s, measured where `is_speed_known` is 1; `speed_ratio` u / u0, on which forces depend
     command      rad, the plane as commanded; `earlier` the commands of the rows before, newest first
     plane        rad, the angle at which the plane acts
     heave, pitch, climb   terms added to w' (m/s^2), q' (rad/s^2), zeta' (m/s)
@@ -66,6 +66,7 @@ class Chain:
     time: ca.SX
     interval: ca.SX
     speed: ca.SX
+    is_speed_known: ca.SX
     speed_ratio: ca.SX
     command: ca.SX
     earlier: list[ca.SX]
@@ -155,6 +156,7 @@ class Structure:
             time=time,
             interval=interval,
             speed=speed,
+            is_speed_known=is_known,
             speed_ratio=ca.SX(1),
             command=rudder,
             earlier=earlier,

@@ -1,0 +1,158 @@
+"""From the commanded to the acting plane angle."""
+
+import casadi as ca
+
+from host.catalogue.switching import after, limited
+from host.equations import Chain, Effect, Parameter
+
+
+def _offset(c: Chain) -> None:
+    c.command = c.command + c.p["rudder_zero"]
+
+
+def _delay(c: Chain) -> None:
+    rows = c.p["delay"] / c.interval
+    c.command = sum(
+        ca.fmax(0, 1 - ca.fabs(rows - lag)) * command for lag, command in enumerate([c.command, *c.earlier])
+    )
+
+
+def _saturation(c: Chain) -> None:
+    c.command = limited(c.command, c.p["plane_limit"])
+
+
+def _rate_limit(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:
+    moved = held + limited(c.plane - held, c.p["plane_rate"] * substep)
+    return (held + moved) / 2, moved
+
+
+def _lag(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:
+    time = c.p["lag_time"]
+    left = ca.exp(-substep / time)
+    mean = c.plane + (held - c.plane) * time / substep * (1 - left)
+    return mean, c.plane + (held - c.plane) * left
+
+
+def _backlash(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:  # noqa: ARG001
+    half = c.p["backlash"] / 2
+    moved = ca.fmax(c.plane - half, ca.fmin(c.plane + half, held))
+    return moved, moved
+
+
+def _stall(c: Chain) -> None:
+    beyond = ca.fmax(0, ca.fabs(c.plane) - c.p["stall_angle"])
+    c.plane = c.plane - c.p["stall_loss"] * beyond * ca.sign(c.plane)
+
+
+def _effectiveness(c: Chain) -> None:
+    c.plane = c.plane * (1 + c.p["effectiveness_step"] * after(c.time, c.p["effectiveness_time"]))
+
+
+def _at_command(c: Chain) -> ca.SX:
+    return c.command
+
+
+_SHARES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+
+EFFECTS = (
+    Effect(
+        name="rudder_offset",
+        slot="actuator",
+        parameters=(Parameter(name="rudder_zero", unit="rad", lower=-0.5, upper=0.5, meaning="zero error"),),
+        sentence="The plane's zero is off: the commanded angle and the acting one differ by a constant.",
+        equation="delta = command + rudder_zero",
+        manoeuvre="level flight with the planes at zero at two speeds",
+        probes=((0.01,),),
+        command=_offset,
+    ),
+    Effect(
+        name="actuator_delay",
+        slot="actuator",
+        parameters=(Parameter(name="delay", unit="s", lower=0, upper=1, meaning="dead time"),),
+        sentence="The plane answers only after a dead time.",
+        equation="delta(t) = command(t - delay)",
+        manoeuvre="plane steps at a higher sampling rate",
+        probes=((0.04,), (0.13,), (0.28,), (0.56,)),
+        command=_delay,
+        lags=True,
+    ),
+    Effect(
+        name="actuator_saturation",
+        slot="actuator",
+        parameters=(Parameter(name="plane_limit", unit="rad", lower=0.005, upper=2, meaning="end stop"),),
+        sentence="The plane meets its stops before the commanded angle.",
+        equation="delta = command, at most plane_limit either way",
+        manoeuvre="plane steps of increasing size up to the largest command",
+        probes=((0.92,), (0.75,), (0.55,), (0.35,)),
+        scales=("rudder",),
+        command=_saturation,
+    ),
+    Effect(
+        name="actuator_rate_limit",
+        slot="actuator",
+        parameters=(
+            Parameter(name="plane_rate", unit="rad/s", lower=0.005, upper=20, meaning="largest rate"),
+        ),
+        sentence="The plane turns no faster than a fixed rate.",
+        equation="|delta'| <= plane_rate",
+        manoeuvre="plane steps of different sizes: the time they take grows with the size",
+        probes=((0.3,), (1.0,), (3.0,)),
+        scales=("rudder",),
+        actuator=_rate_limit,
+        state="rate_limited",
+        initial=_at_command,
+    ),
+    Effect(
+        name="actuator_lag",
+        slot="actuator",
+        parameters=(Parameter(name="lag_time", unit="s", lower=0.01, upper=10, meaning="time constant"),),
+        sentence="The plane follows its command with a first-order lag.",
+        equation="delta' = (command - delta)/lag_time",
+        manoeuvre="plane steps of different sizes at a sampling interval below the lag",
+        probes=((0.1,), (0.4,), (1.2,)),
+        actuator=_lag,
+        state="lagged",
+        initial=_at_command,
+    ),
+    Effect(
+        name="actuator_backlash",
+        slot="actuator",
+        parameters=(Parameter(name="backlash", unit="rad", lower=0, upper=0.6, meaning="play"),),
+        sentence="There is play between the servo and the plane: it stays behind at every reversal.",
+        equation="delta moves only when the command leaves a band of width backlash",
+        manoeuvre="small plane reversals about several mean angles",
+        probes=((0.05,), (0.2,), (0.4,)),
+        scales=("rudder",),
+        actuator=_backlash,
+        state="slack",
+        initial=_at_command,
+    ),
+    Effect(
+        name="rudder_stall",
+        slot="actuator",
+        parameters=(
+            Parameter(name="stall_angle", unit="rad", lower=0.01, upper=1.5, meaning="where lift breaks"),
+            Parameter(name="stall_loss", unit="1", lower=0, upper=3, meaning="1: flat, more: falling lift"),
+        ),
+        sentence="Beyond an angle the plane stalls: its lift no longer grows.",
+        equation="acting angle = delta - stall_loss (|delta| - stall_angle)+ sign(delta)",
+        manoeuvre="plane steps of increasing size beyond the stall angle",
+        probes=((0.5, 1.3), (0.75, 1.6)),
+        scales=("rudder", ""),
+        plane=_stall,
+    ),
+    Effect(
+        name="rudder_effectiveness_change",
+        slot="actuator",
+        parameters=(
+            Parameter(name="effectiveness_step", unit="1", lower=-1, upper=5, meaning="share lost or gained"),
+            Parameter(name="effectiveness_time", unit="s", lower=0, upper=1e6, meaning="when it happened"),
+        ),
+        sentence="The plane's effect changed at one moment: a fin was damaged, fouled or lost.",
+        equation="acting angle = delta (1 + effectiveness_step (t > effectiveness_time))",
+        manoeuvre="the same plane steps before and after",
+        probes=tuple((-0.2, share) for share in _SHARES),
+        scales=("", "duration"),
+        plane=_effectiveness,
+    ),
+)

@@ -1,0 +1,96 @@
+"""Forces in heave, w' = ..."""
+
+import casadi as ca
+
+from host.catalogue.switching import after
+from host.equations import Chain, Effect, Parameter
+
+
+def _coupling(c: Chain) -> None:
+    c.heave += c.p["c_wq"] * c.q
+
+
+def _drag(c: Chain) -> None:
+    c.heave += c.p["c_ww"] * c.w * ca.fabs(c.w)
+
+
+def _buoyancy(c: Chain) -> None:
+    c.heave += c.p["c_w0"]
+
+
+def _compressibility(c: Chain) -> None:
+    c.heave += c.p["c_wz"] * (c.zeta - c.p["neutral_depth"])
+
+
+def _ballast(c: Chain) -> None:
+    c.heave += c.p["c_wb"] * after(c.time, c.p["ballast_time"])
+
+
+EFFECTS = (
+    Effect(
+        name="heave_pitch_rate_coupling",
+        slot="heave",
+        parameters=(
+            Parameter(name="c_wq", unit="m/s", lower=-20, upper=20, meaning="pitch rate into heave"),
+        ),
+        sentence="Pitching at a forward speed throws the hull sideways: the pitch rate drives heave "
+        "(centripetal term m u q and Zq q), which the base model leaves out.",
+        equation="w' = ... + c_wq q",
+        manoeuvre="quick plane reversals (3-2-1-1) at cruising speed, which make the pitch rate large",
+        probes=((0.5,), (-0.5,)),
+        scales=("speed",),
+        force=_coupling,
+    ),
+    Effect(
+        name="heave_quadratic_drag",
+        slot="heave",
+        parameters=(Parameter(name="c_ww", unit="1/m", lower=-50, upper=5, meaning="cross-flow drag"),),
+        sentence="Cross-flow drag in heave grows with the square of the heave velocity.",
+        equation="w' = ... + c_ww w |w|",
+        manoeuvre="plane steps of several sizes, the largest held for five heave time constants",
+        probes=((-1.0,),),
+        force=_drag,
+    ),
+    Effect(
+        name="net_buoyancy",
+        slot="heave",
+        parameters=(
+            Parameter(name="c_w0", unit="m/s^2", lower=-5, upper=5, meaning="net weight per heave mass"),
+        ),
+        sentence="The vehicle is not neutral: weight and buoyancy differ by a constant force.",
+        equation="w' = ... + c_w0",
+        manoeuvre="a start from rest with the planes level, or a change of speed",
+        probes=((0.0,),),
+        force=_buoyancy,
+    ),
+    Effect(
+        name="depth_dependent_buoyancy",
+        slot="heave",
+        parameters=(
+            Parameter(name="c_wz", unit="1/s^2", lower=-1, upper=1, meaning="buoyancy change with depth"),
+            Parameter(
+                name="neutral_depth", unit="m", lower=-1000, upper=6000, meaning="depth of neutral trim"
+            ),
+        ),
+        sentence="Buoyancy changes with depth: the hull or the water is compressed.",
+        equation="w' = ... + c_wz (zeta - neutral_depth)",
+        manoeuvre="long straight runs at the shallowest and the deepest depth of the mission",
+        probes=((1e-3, 1.0),),
+        scales=("", "depth"),
+        force=_compressibility,
+    ),
+    Effect(
+        name="ballast_change",
+        slot="heave",
+        parameters=(
+            Parameter(name="c_wb", unit="m/s^2", lower=-5, upper=5, meaning="step of net weight"),
+            Parameter(name="ballast_time", unit="s", lower=0, upper=1e6, meaning="when it happened"),
+        ),
+        sentence="The weight changed at one moment: ballast was dropped, or water came in.",
+        equation="w' = ... + c_wb (t > ballast_time)",
+        manoeuvre="straight level runs before and after",
+        probes=tuple((0.0, share) for share in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)),
+        scales=("", "duration"),
+        force=_ballast,
+    ),
+)

@@ -1,0 +1,69 @@
+"""Moments in pitch, q' = ..."""
+
+import casadi as ca
+
+from host.equations import Chain, Effect, Parameter
+
+
+def _damping(c: Chain) -> None:
+    c.pitch += c.p["c_qq"] * c.q * ca.fabs(c.q)
+
+
+def _trim(c: Chain) -> None:
+    c.pitch += c.p["c_q0"]
+
+
+def _munk(c: Chain) -> None:
+    c.pitch += c.p["c_qw"] * c.w
+
+
+def _restoring(c: Chain) -> None:
+    c.pitch += c.p["restoring_share"] * c.p["a3"] * (ca.sin(c.theta) - c.theta)
+
+
+EFFECTS = (
+    Effect(
+        name="pitch_quadratic_damping",
+        slot="pitch",
+        parameters=(Parameter(name="c_qq", unit="1/rad", lower=-200, upper=20, meaning="quadratic damping"),),
+        sentence="Damping in pitch grows with the square of the pitch rate.",
+        equation="q' = ... + c_qq q |q|",
+        manoeuvre="quick plane reversals of several sizes",
+        probes=((-2.0,),),
+        force=_damping,
+    ),
+    Effect(
+        name="trim_moment",
+        slot="pitch",
+        parameters=(Parameter(name="c_q0", unit="rad/s^2", lower=-20, upper=20, meaning="constant moment"),),
+        sentence="A constant moment pitches the vehicle: weights out of trim, or an asymmetric hull.",
+        equation="q' = ... + c_q0",
+        manoeuvre="straight runs with the planes level at two speeds",
+        probes=((0.0,),),
+        force=_trim,
+    ),
+    Effect(
+        name="munk_moment",
+        slot="pitch",
+        parameters=(
+            Parameter(name="c_qw", unit="rad/(m s)", lower=-100, upper=100, meaning="heave into pitch"),
+        ),
+        sentence="Heave velocity turns the hull (Munk moment): angle of attack drives pitch.",
+        equation="q' = ... + c_qw w",
+        manoeuvre="plane steps held for several heave time constants, longer than the pitch transient",
+        probes=((0.5,), (-0.5,)),
+        force=_munk,
+    ),
+    Effect(
+        name="large_angle_restoring",
+        slot="pitch",
+        parameters=(
+            Parameter(name="restoring_share", unit="1", lower=-1, upper=4, meaning="1 is the full sine"),
+        ),
+        sentence="At large pitch the restoring moment follows the sine of the angle, not the angle.",
+        equation="q' = a2 q + a3 [theta + restoring_share (sin theta - theta)] + ...",
+        manoeuvre="climbs and dives at the largest pitch angle allowed",
+        probes=((1.0,),),
+        force=_restoring,
+    ),
+)
