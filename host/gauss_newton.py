@@ -60,6 +60,18 @@ class GaussNewton:
             Hxx = H[count:, count:] + np.diag(INITIAL_STATE_PRIOR**-2.0)
             self.own.append((H[:count, count:], Hxx, g[count:]))
 
+    def predicted_cost(self, cost: float) -> float:
+        """Sum of squares after the full step if the equations were linear."""
+        count = self.g.size
+        reduced, rhs, left = self.information(), self.g.copy(), cost
+        for Hpx, Hxx, gx in self.own:
+            step = np.linalg.solve(Hxx, gx)
+            rhs -= Hpx @ step
+            left -= float(gx @ step)
+        scale = np.sqrt(np.maximum(np.diag(self.H), 1e-300))
+        normal = reduced / np.outer(scale, scale) + 1e-9 * np.eye(count)
+        return left - float((rhs / scale) @ np.linalg.solve(normal, rhs / scale))
+
     def information(self) -> Array:
         """Fisher information of the free parameters alone."""
         reduced = self.H.copy()

@@ -228,6 +228,11 @@ def _filter_likelihood(point: Point, inputs: list[Inputs]) -> float:
     return float(value) if np.isfinite(value) else -np.inf
 
 
+def residuals_at(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:
+    """Free-run residuals whitened by the point's sensor noise, and their sensitivities."""
+    return _whitened_by(point.noise, _innovations(point, inputs))
+
+
 def _innovations(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:
     return [innovations(point.parameters, x0, one) for x0, one in zip(point.initial, inputs, strict=True)]
 

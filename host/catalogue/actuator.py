@@ -12,9 +12,8 @@ def _offset(c: Chain) -> None:
 
 def _delay(c: Chain) -> None:
     rows = c.p["delay"] / c.interval
-    c.command = sum(
-        ca.fmax(0, 1 - ca.fabs(rows - lag)) * command for lag, command in enumerate([c.command, *c.earlier])
-    )
+    weights = [ca.fmax(0, 1 - ca.fabs(rows - lag)) for lag in range(len(c.earlier) + 1)]
+    c.command = ca.dot(ca.vertcat(*weights), ca.vertcat(c.command, *c.earlier))
 
 
 def _saturation(c: Chain) -> None:

@@ -66,7 +66,7 @@ EFFECTS = (
             Parameter(name="wave_period", unit="s", lower=2, upper=20, meaning="period"),
         ),
         sentence="Surface waves carry the vehicle up and down, less so the deeper it is.",
-        equation="zeta' = ... + exp(-k zeta) [wave_sine sin(k c t) + wave_cosine cos(k c t)], k c = 2 pi/T, c^2 = g/k",
+        equation="zeta' = ... + exp(-k zeta) (wave_sine sin ot + wave_cosine cos ot), o = 2 pi/T, k = o^2/g",
         manoeuvre="level runs at two depths, the shallower one within a few metres of the surface",
         probes=tuple((0.01, 0.01, period) for period in (3.0, 4.0, 5.0, 6.0, 7.0, 8.5, 10.0, 12.0, 15.0)),
         force=_surface_waves,

@@ -1,0 +1,40 @@
+"""The sensors' own noise, from the recording alone: below it there is nothing left to explain."""
+
+import numpy as np
+
+from host.recording import Array, Recording
+
+ORDER = 4  # differences; a smooth motion vanishes in them, white noise grows by a known factor
+
+
+def noise_floor(recordings: list[Recording]) -> Array:
+    """Variances (2,) of the white noise in pitch (rad^2) and depth (m^2).
+
+    The median magnitude of fourth differences, over that of unit white noise: plane steps are rare enough
+    not to move a median. A quantised channel at rest gives zero: its rounding is the least.
+    """
+    return np.array([_channel([r.pitch for r in recordings]), _channel([r.depth for r in recordings])])
+
+
+def _channel(pieces: list[Array]) -> float:
+    gain = np.sqrt(sum(_binomial(ORDER, k) ** 2 for k in range(ORDER + 1)))
+    differences = np.concatenate([np.diff(piece, ORDER) for piece in pieces])
+    differences = differences[np.isfinite(differences)]
+    spread = np.median(np.abs(differences)) / 0.6745 / gain if differences.size >= 20 else 0.0
+    return float(max(spread**2, _quantum(pieces) ** 2 / 12.0, 1e-12))
+
+
+def _quantum(pieces: list[Array]) -> float:
+    """The step of a quantised channel; 0 where hardly any value repeats."""
+    values = np.concatenate([piece[np.isfinite(piece)] for piece in pieces])
+    levels = np.unique(np.round(values, 9))
+    if levels.size < 2 or levels.size > values.size / 3:
+        return 0.0
+    return float(np.median(np.diff(levels)))
+
+
+def _binomial(n: int, k: int) -> int:
+    result = 1
+    for i in range(k):
+        result = result * (n - i) // (i + 1)
+    return result

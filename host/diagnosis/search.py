@@ -1,0 +1,191 @@
+"""Which set of effects explains the recording: a beam search over sets, each refitted jointly.
+
+Effects are never added one at a time for good: sets are carried side by side, every member of a set is
+re-estimated with the base whenever one joins, and members that no longer pay are dropped. What an effect
+could gain is first predicted by one Gauss-Newton step from each of its probes; the promising ones are fitted.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import log
+
+import numpy as np
+
+from host.catalogue import CATALOGUE, structure_of
+from host.equations import NAMES, Effect
+from host.gauss_newton import GaussNewton, Point
+from host.maximum_likelihood import Fit, fit_maximum_likelihood, output_error, residuals_at
+from host.propagate import Inputs, inputs_of
+from host.recording import Array, Recording
+
+HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis a trim offset is an effect with a name
+NAMING_MARGIN = 8.0  # of BIC, beyond which an effect pays; holds false naming down over the whole catalogue
+BEAM = 4
+PROMISING = 6
+LARGEST_SET = 5
+
+Names = frozenset[str]
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """A set of effects, fitted jointly with the base."""
+
+    names: Names
+    fit: Fit
+    bic: float
+
+
+class Search:
+    """Explanations of some recordings, each set fitted once."""
+
+    def __init__(self, recordings: list[Recording], on_progress: Progress = lambda _: None) -> None:
+        self.recordings = recordings
+        self.on_progress = on_progress
+        self._known: dict[Names, Explanation] = {}
+        held = dict(HELD)
+        if recordings[0].has_speed:
+            held["u0"] = float(np.mean([r.speed.mean() for r in recordings]))
+            # Where the speed is measured its loss is data, and there is nothing in it to estimate.
+            held |= {"speed_time": 1.0, "c_ud": 0.0}
+        self._held = held
+        self._scale = {
+            "": 1.0,
+            "speed": 1.0,
+            "rudder": float(max(np.abs(r.rudder).max() for r in recordings)) or 1.0,
+            "duration": float(recordings[-1].time[-1]),
+            "depth": float(np.nanmean(np.concatenate([r.depth for r in recordings]))),
+        }
+        self._inputs: dict[Names, list[Inputs]] = {}
+        on_progress("base model")
+        base = {name: value for name, value in held.items() if name in NAMES}
+        fit = fit_maximum_likelihood(recordings, held=base, noise_model="output_error")
+        self.base = self._remember(frozenset(), fit)
+        self._scale["speed"] = float(fit.parameters[fit.structure.names.index("u0")])
+
+    def run(self) -> list[Explanation]:
+        """All explanations tried, best first."""
+        beam = [self.base]
+        for size in range(1, LARGEST_SET + 1):
+            grown: dict[Names, Explanation] = {}
+            for number, parent in enumerate(beam):
+                for effect in self._promising(parent, len(CATALOGUE) if size == 1 else PROMISING):
+                    name = " + ".join(sorted(parent.names | {effect.name}))
+                    self.on_progress(f"{size} effect{'s' * (size > 1)}, {number + 1}/{len(beam)}: {name}")
+                    child = self.extended(parent, effect)
+                    grown[child.names] = child
+            best_before = min(e.bic for e in beam)
+            beam = sorted(grown.values(), key=lambda e: e.bic)[:BEAM]
+            if not beam or beam[0].bic > best_before - NAMING_MARGIN:
+                break
+        return sorted(self._known.values(), key=lambda e: e.bic)
+
+    def simplest(self) -> Explanation:
+        """The best explanation all of whose members pay for themselves."""
+        best = min(self._known.values(), key=lambda e: e.bic)
+        pruned = True
+        while pruned and best.names:
+            pruned = False
+            for name in sorted(best.names):
+                smaller = self.without(best, name)
+                if smaller.bic < best.bic + NAMING_MARGIN:
+                    best, pruned = smaller, True
+                    break
+        return best
+
+    def extended(self, parent: Explanation, effect: Effect) -> Explanation:
+        """The parent's set with one effect more, from the effect's best probes."""
+        names = parent.names | {effect.name}
+        if names in self._known:
+            return self._known[names]
+        ranked = sorted(self._probed(parent, effect), key=lambda probed: -probed[0])
+        fits = [self._fit(names, parent, effect.name, probe) for _, probe in ranked[:2]]
+        return self._remember(names, max(fits, key=lambda fit: fit.log_likelihood))
+
+    def without(self, explanation: Explanation, name: str) -> Explanation:
+        """The same set without one of its effects."""
+        names = explanation.names - {name}
+        if names not in self._known:
+            self._remember(names, self._fit(names, explanation))
+        return self._known[names]
+
+    def swapped(self, explanation: Explanation, out: str, into: Effect) -> Explanation:
+        """One effect in the place of another."""
+        return self.extended(self.without(explanation, out), into)
+
+    def gains(self, parent: Explanation) -> dict[str, float]:
+        """Twice the log-likelihood each effect could gain on top of the parent, predicted."""
+        return {
+            effect.name: max(gain for gain, _ in self._probed(parent, effect))
+            for effect in CATALOGUE
+            if effect.name not in parent.names
+        }
+
+    def free_parameters(self, names: Names) -> int:
+        """How many coefficients the set adds to the base."""
+        return sum(
+            parameter.name not in self._held
+            for effect in structure_of(names).effects
+            for parameter in effect.parameters
+        )
+
+    def _promising(self, parent: Explanation, most: int) -> list[Effect]:
+        gains = self.gains(parent)
+        order = sorted(gains, key=lambda name: -gains[name])
+        worth = [name for name in order if gains[name] > NAMING_MARGIN]
+        return [effect for name in worth[:most] for effect in CATALOGUE if effect.name == name]
+
+    def _probed(self, parent: Explanation, effect: Effect) -> list[tuple[float, Array]]:
+        """Predicted gain and values of each probe of an effect: one Gauss-Newton step from there."""
+        names = parent.names | {effect.name}
+        structure = structure_of(names)
+        inputs = self._inputs_for(names)
+        free = np.array([name not in self._held for name in structure.names])
+        before = sum(float(np.nansum(e**2)) for e in parent.fit.whitened)
+        probed = []
+        for probe in self._probes(effect):
+            point = Point(
+                structure,
+                self._start(names, parent, effect.name, probe),
+                parent.fit.initial,
+                parent.fit.noise,
+            )
+            white = residuals_at(point, inputs)
+            step = GaussNewton(white, point, free)
+            left = step.predicted_cost(sum(float(np.sum(e**2)) for e, _ in white))
+            probed.append((before - left, probe))
+        return probed
+
+    def _probes(self, effect: Effect) -> list[Array]:
+        scales = np.array([self._scale[scale] for scale in effect.scales or ("",) * len(effect.parameters)])
+        return [np.array(probe) * scales for probe in effect.probes]
+
+    def _start(self, names: Names, parent: Explanation, added: str | None, probe: Array | None) -> Array:
+        known = dict(zip(parent.fit.structure.names, parent.fit.parameters, strict=True))
+        if added is not None and probe is not None:
+            effect = next(effect for effect in CATALOGUE if effect.name == added)
+            known |= {p.name: value for p, value in zip(effect.parameters, probe, strict=True)}
+        known |= {name: value for name, value in self._held.items() if name in known}
+        return np.array([known[name] for name in structure_of(names).names])
+
+    def _fit(
+        self, names: Names, parent: Explanation, added: str | None = None, probe: Array | None = None
+    ) -> Fit:
+        structure = structure_of(names)
+        free = np.array([name not in self._held for name in structure.names])
+        start = Point(
+            structure, self._start(names, parent, added, probe), parent.fit.initial, parent.fit.noise
+        )
+        return output_error(start, self._inputs_for(names), free)
+
+    def _inputs_for(self, names: Names) -> list[Inputs]:
+        if names not in self._inputs:
+            structure = structure_of(names)
+            self._inputs[names] = [inputs_of(recording, structure) for recording in self.recordings]
+        return self._inputs[names]
+
+    def _remember(self, names: Names, fit: Fit) -> Explanation:
+        bic = -2.0 * fit.log_likelihood + self.free_parameters(names) * log(fit.samples)
+        self._known[names] = Explanation(names, fit, bic)
+        return self._known[names]
