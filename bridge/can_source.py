@@ -19,6 +19,7 @@ class CanSource:
         # A CAN link counts the frames that it refuses itself; one table shows them all.
         counts = getattr(link, "counts", None)
         self.counts: Counter[str] = counts if isinstance(counts, Counter) else Counter()
+        self.notes: list[str] = []
         self._link = link
         self._publishes = can_map.publishes
         self._decoder = CanDecoder(can_map, self.counts)

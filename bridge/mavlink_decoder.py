@@ -54,6 +54,7 @@ class MavlinkDecoder:
         self._servo = ServoMix(mapping.rudder, self.counts)
         self._gate = MeasurementGate(self.counts)
         self._attitude: tuple[int, float, float] | None = None  # time, pitch, yaw
+        self._others: set[int] = set()  # systems with an autopilot that is not the vehicle
         self._latest: Frame | None = None
         self._handlers: dict[str, Callable[[bytes, int, list[Measurement]], None]] = {
             "ATTITUDE": self._on_attitude,
@@ -93,13 +94,13 @@ class MavlinkDecoder:
         self.counts[name] += 1
         if frame.signed:
             self.counts["note.signed"] += 1
-        if self.vehicle is None:
-            self._look_for_vehicle(frame)
-            if self.vehicle is None:
-                self.counts["refused.no_vehicle_yet"] += 1
-                return
+        if self.vehicle is None and not self.knows_vehicle(frame):
+            self.counts["refused.no_vehicle_yet"] += 1
+            return
         if (frame.system, frame.component) != self.vehicle:
             self.counts["refused.other_sender"] += 1
+            if frame.kind.name == "HEARTBEAT":
+                self._note_other_vehicle(frame)
             return
         if not self._is_new(frame):
             self.counts["refused.duplicate"] += 1
@@ -109,19 +110,26 @@ class MavlinkDecoder:
         if handler is not None:
             handler(frame.payload, t_us, out)
 
-    def _look_for_vehicle(self, frame: Frame) -> None:
-        if frame.kind.name != "HEARTBEAT":
-            return
+    def knows_vehicle(self, frame: Frame) -> bool:
+        """Whether the vehicle is known, at the latest by this frame."""
         wanted = self._map
-        vehicle_type, autopilot = _HEARTBEAT(frame.payload)
         if (
-            autopilot != dialect.MAV_AUTOPILOT_INVALID
-            and vehicle_type not in _NOT_VEHICLES
+            self.vehicle is None
+            and _is_autopilot(frame)
             and wanted.system_id in (None, frame.system)
             and wanted.component_id in (None, frame.component)
         ):
             self.vehicle = frame.system, frame.component
             self.notes.append(f"locked to system {frame.system}, component {frame.component}")
+        return self.vehicle is not None
+
+    def _note_other_vehicle(self, frame: Frame) -> None:
+        if frame.system not in self._others and self._map.system_id is None and _is_autopilot(frame):
+            self._others.add(frame.system)
+            self.notes.append(
+                f"system {frame.system} is an autopilot on this link too and is ignored: "
+                "[mavlink] system_id says which one to use"
+            )
 
     def _is_new(self, frame: Frame) -> bool:
         """False for a frame that came twice; counts the ones missing since the last."""
@@ -220,6 +228,13 @@ class MavlinkDecoder:
         if command == dialect.MAV_CMD_SET_MESSAGE_INTERVAL:
             accepted = result in (dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_IN_PROGRESS)
             self.counts["ack.accepted" if accepted else "ack.denied"] += 1
+
+
+def _is_autopilot(frame: Frame) -> bool:
+    if frame.kind.name != "HEARTBEAT":
+        return False
+    vehicle_type, autopilot = _HEARTBEAT(frame.payload)
+    return autopilot != dialect.MAV_AUTOPILOT_INVALID and vehicle_type not in _NOT_VEHICLES
 
 
 def forward_speed(ned: Sequence[float], pitch: float, yaw: float) -> float:

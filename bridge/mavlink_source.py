@@ -23,7 +23,7 @@ class MavlinkSource:
     Sends a heartbeat as a companion computer once a second, asks for the message rates of the map once the
     vehicle is known, and every 10 s counts what came and asks again for what came too rarely: a parameter
     download, a ground station or a restart of the vehicle takes a rate away without telling. A denied request
-    is counted ("ack.denied") and noted once.
+    is counted ("ack.denied") and, once the depth source is known, noted once.
     """
 
     def __init__(
@@ -42,6 +42,7 @@ class MavlinkSource:
         self._heartbeat_us: int | None = None
         self._supervised_us: int | None = None
         self._heard_before: Counter[str] = Counter()
+        self._denials_expected = 0
         self._denial_noted = False
         self.counts = self._decoder.counts
 
@@ -77,9 +78,18 @@ class MavlinkSource:
             elapsed_us = None if self._supervised_us is None else now - self._supervised_us
             self._supervised_us = now
             self._supervise(vehicle, elapsed_us)
-        if self.counts["ack.denied"] and not self._denial_noted:
+        self._note_denials()
+
+    def _note_denials(self) -> None:
+        denied = self.counts["ack.denied"]
+        if self._decoder.depth_source is None:
+            self._denials_expected = denied  # no vehicle has all the messages that depth may come from
+        elif denied > self._denials_expected and not self._denial_noted:
             self._denial_noted = True
-            self.notes.append("the vehicle denied a message rate: ask for less, or for 0 to leave its own")
+            self.notes.append(
+                "the vehicle denied a message rate: lower attitude_rate_hz, depth_rate_hz, servo_rate_hz or "
+                "speed_rate_hz in [mavlink], or set it to 0 to leave the vehicle's own"
+            )
 
     def _supervise(self, vehicle: tuple[int, int], elapsed_us: int | None) -> None:
         for message, rate_hz in self._wanted_rates().items():

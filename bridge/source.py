@@ -1,7 +1,7 @@
 """What the host loop reads: a link joined to its decoder and encoder."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from bridge.measurement import Measurement
@@ -12,6 +12,10 @@ class Source(Protocol):
 
     counts: Counter[str]
     """Everything seen and everything refused, by cause: "ATTITUDE", "refused.crc", "refused.repeat", ..."""
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """What was decided on the user's behalf, one sentence each; grows while reading."""
 
     def read(self, timeout_s: float) -> list[Measurement]:
         """Measurements that came within `timeout_s`; also keeps the link alive (heartbeat, rate requests).

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 from bridge.errors import LogFormatError
@@ -18,16 +19,22 @@ _LEAST_SHARE = 0.01  # of the file that must be intact frames; less is another k
 def read_tlog(path: Path, mapping: MavlinkMap) -> tuple[list[Measurement], Counter[str], list[str]]:
     """All measurements of a .tlog, counts by message name and refusal, and notes.
 
-    Damaged records, text between records and a cut tail cost only themselves. LogFormatError when the file
-    holds no MAVLink to speak of.
+    Damaged records, text between records and a cut tail cost only themselves; what stands before the first
+    heartbeat is used as well. LogFormatError when the file holds no MAVLink to speak of.
     """
     data = path.read_bytes()
     decoder = MavlinkDecoder(mapping)
     out: list[Measurement] = []
     intact = 0
+    waiting: list[tuple[int, Frame]] = []
     for t_us, frame in walk_tlog(data, decoder.counts):
         intact += _STAMP + frame.length
-        out += decoder.take(frame, t_us)
+        waiting.append((t_us, frame))
+        if decoder.knows_vehicle(frame):
+            out += chain.from_iterable(decoder.take(each, at_us) for at_us, each in waiting)
+            waiting.clear()
+    for t_us, frame in waiting:
+        decoder.take(frame, t_us)  # counts them
     if intact < _LEAST_SHARE * len(data) or not intact:
         raise LogFormatError(
             f"{path.name}: no MAVLink in it ({intact} of {len(data)} bytes are intact records); "

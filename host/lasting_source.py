@@ -1,7 +1,7 @@
 """A source that outlives its link: a cable pulled is waited for, and nothing is joined across the break."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from bridge.errors import BridgeError, LinkClosed
@@ -53,9 +53,9 @@ class LastingSource:
         return self._earlier + self._source.counts if self._source else Counter(self._earlier)
 
     @property
-    def notes(self) -> list[str]:
-        """What the source decided on the user's behalf, if it keeps such notes."""
-        return list(getattr(self._source, "notes", ()))
+    def notes(self) -> Sequence[str]:
+        """As `Source.notes`; none while the link is gone."""
+        return self._source.notes if self._source else ()
 
     def read(self, timeout_s: float) -> list[Measurement]:
         """As `Source.read`; [] while the link is gone. Raises LinkClosed once it is given up."""

@@ -225,6 +225,7 @@ def _explain(channel: str, error: Exception) -> str:
     cause = _cause(error)
     text = f"{error} {cause}".lower()
     advice = {
+        errno.EINVAL: f"{cause}; a multicast GROUP is 224.0.0.0 to 239.255.255.255",
         errno.EAFNOSUPPORT: "the kernel has no CAN support: sudo modprobe can_raw, or take slcan, socketcand",
         errno.ENODEV: f"there is no interface {channel}: `ip link show type can` lists them",
         errno.EACCES: f"no permission ({cause})",
@@ -234,4 +235,6 @@ def _explain(channel: str, error: Exception) -> str:
         return "msgpack is missing: pip install 'python-can[multicast]'"
     if "serial" in text and isinstance(error, ImportError | NotImplementedError):
         return "pyserial is missing: pip install pyserial"
+    if isinstance(error, NameError | ImportError):  # a maker's library that python-can has not found
+        return f"the driver of its maker is not installed ({cause})"
     return advice.get(number or 0, cause)

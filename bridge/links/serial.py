@@ -1,11 +1,13 @@
 """Serial ports: `serial:DEVICE[:BAUD]`."""
 
+import errno
 from collections.abc import Callable
 
 import serial
 
 from bridge.errors import LinkClosed, LinkError
 from bridge.link import Packet
+from bridge.links.refusal import refusal
 from bridge.links.udp import monotonic_us
 
 _WRITE_S = 1.0
@@ -25,7 +27,7 @@ class SerialLink:
         try:
             port = serial.Serial(device, baud, timeout=0, write_timeout=_WRITE_S)
         except (serial.SerialException, OSError, ValueError) as error:
-            raise LinkError(f"{name} cannot be opened: {_why(error)}") from error
+            raise LinkError(f"{name} cannot be opened: {_refusal(device, error)}") from error
         return cls(port, name)
 
     def read(self, timeout_s: float) -> list[Packet]:
@@ -59,6 +61,13 @@ class SerialLink:
         if self._port is None:
             raise LinkClosed(f"{self._name} was closed")
         return self._port
+
+
+def _refusal(device: str, error: Exception) -> str:
+    if isinstance(error, serial.SerialException) and "configure" in str(error):
+        return "it must be a serial port"  # pyserial keeps the errno to itself here
+    rights = f"sudo usermod -aG dialout $USER, then log in again; see `ls -l {device}`"
+    return refusal(error, {errno.EACCES: rights})
 
 
 def _why(error: Exception) -> str:

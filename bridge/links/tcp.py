@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from bridge.errors import LinkClosed, LinkError
 from bridge.link import Packet
+from bridge.links.refusal import refusal
 from bridge.links.udp import monotonic_us
 
 _CONNECT_S = 5.0
@@ -26,8 +27,7 @@ class TcpLink:
         try:
             sock = socket.create_connection((host, port), timeout=_CONNECT_S)
         except (OSError, OverflowError, UnicodeError) as error:
-            reason = getattr(error, "strerror", None) or str(error)
-            raise LinkError(f"{name} cannot be opened: {reason}; is the server running?") from error
+            raise LinkError(f"{name} cannot be opened: {refusal(error)}") from error
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.settimeout(_WRITE_S)
         return cls(sock, name)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from bridge.errors import LinkClosed, LinkError
 from bridge.link import Packet
+from bridge.links.refusal import refusal
 
 _MOST_PER_READ = 1000  # datagrams; a flood must not keep the caller from its heartbeat
 _PEER_SILENCE_US = 5_000_000
@@ -48,9 +49,7 @@ class UdpLink:
             sock.bind((host, port))
         except (OSError, OverflowError) as error:
             sock.close()
-            raise LinkError(
-                f"udp:{host}:{port} cannot be opened: {_reason(error)}; is another program using the port?"
-            ) from error
+            raise LinkError(f"udp:{host}:{port} cannot be opened: {refusal(error)}") from error
         return cls._ready(sock, None, counts)
 
     @classmethod
@@ -62,7 +61,7 @@ class UdpLink:
             sock.bind(("", 0))
         except (OSError, OverflowError, UnicodeError) as error:
             sock.close()
-            raise LinkError(f"udpout:{host}:{port} cannot be opened: {_reason(error)}") from error
+            raise LinkError(f"udpout:{host}:{port} cannot be opened: {refusal(error)}") from error
         return cls._ready(sock, (str(peer[0]), int(peer[1])), counts)
 
     @classmethod
@@ -122,7 +121,3 @@ class UdpLink:
         if self._socket is None:
             raise LinkClosed("the UDP link was closed")
         return self._socket
-
-
-def _reason(error: Exception) -> str:
-    return getattr(error, "strerror", None) or str(error)

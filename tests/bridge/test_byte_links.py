@@ -1,5 +1,6 @@
 """One contract for every byte link, over loopback and a pseudo terminal; then what each medium adds."""
 
+import errno
 import os
 import pty
 import socket
@@ -15,6 +16,7 @@ import pytest
 
 from bridge.errors import LinkClosed, LinkError
 from bridge.link import Link, Packet
+from bridge.links.refusal import refusal
 from bridge.links.serial import SerialLink
 from bridge.links.tcp import TcpLink
 from bridge.links.udp import UdpLink
@@ -233,7 +235,7 @@ def test_port_in_use_is_one_clear_line() -> None:
 
 
 def test_host_that_is_not_ours_is_one_clear_line() -> None:
-    with pytest.raises(LinkError, match=r"^udp:192\.0\.2\.1:14550 cannot be opened: "):
+    with pytest.raises(LinkError, match=r"^udp:192\.0\.2\.1:14550 .*; HOST must be an address of this"):
         UdpLink.listen("192.0.2.1", 14550)
 
 
@@ -248,12 +250,34 @@ def test_host_that_does_not_resolve_is_one_clear_line(host: str) -> None:
 
 
 def test_tcp_without_a_server_is_one_clear_line() -> None:
-    with pytest.raises(LinkError, match=r"^tcp:127\.0\.0\.1:1 cannot be opened: Connection refused"):
+    with pytest.raises(LinkError, match=r"^tcp:127\.0\.0\.1:1 cannot be opened: Connection refused; is the"):
         TcpLink.open(HOST, 1)
 
 
 def test_missing_serial_device_is_one_clear_line(tmp_path: Path) -> None:
-    for device in (tmp_path / "ttyNone", tmp_path):
-        with pytest.raises(LinkError, match=rf"^serial:{device}:57600 cannot be opened: .+") as caught:
+    ordinary = tmp_path / "notes.txt"
+    ordinary.touch()
+    for device, cause in [
+        (tmp_path / "ttyNone", "No such file or directory; plug the device in; `mils doctor` lists"),
+        (tmp_path, "Is a directory"),
+        (ordinary, "it must be a serial port"),
+    ]:
+        with pytest.raises(LinkError) as caught:
             SerialLink.open(str(device), 57600)
+        assert str(caught.value).startswith(f"serial:{device}:57600 cannot be opened: {cause}")
         assert "\n" not in str(caught.value)
+
+
+def test_refusal_says_what_to_do() -> None:
+    for number, remedy in [
+        (errno.EADDRINUSE, "ss -lnup"),
+        (errno.ENETUNREACH, "ip route"),
+        (errno.EBUSY, "another program"),
+    ]:
+        assert remedy in refusal(OSError(number, "x"))
+    assert refusal(OSError(errno.EACCES, "x"), {errno.EACCES: "ask"}) == "Permission denied; ask"
+    assert refusal(TimeoutError("timed out")).startswith("Connection timed out; check")
+    assert refusal(socket.gaierror(-2, "Name or service not known")).endswith(
+        "check HOST, or give it as numbers"
+    )
+    assert refusal(OverflowError("port must be 0-65535")) == "port must be 0-65535"

@@ -146,6 +146,19 @@ def test_two_interleaved_vehicles_give_one_vehicles_measurements() -> None:
     assert d.counts["refused.other_sender"] == 60
 
 
+def test_a_second_autopilot_on_the_link_is_told_once() -> None:
+    d = decoder(system_id=None)
+    first, second, station = Vehicle(1), Vehicle(2), Vehicle(255, 190)
+    for _ in range(2):
+        d.feed(first.heartbeat() + second.heartbeat() + station.heartbeat(dialect.MAV_TYPE_GCS, 8), 0)
+    assert [note for note in d.notes if "autopilot on this link too" in note] == [
+        "system 2 is an autopilot on this link too and is ignored: [mavlink] system_id says which one to use"
+    ]
+    chosen = decoder(system_id=1)
+    chosen.feed(first.heartbeat() + second.heartbeat(), 0)
+    assert chosen.notes == []
+
+
 def test_frame_that_came_twice_counts_once() -> None:
     v = Vehicle()
     d = decoder(depth_source="VFR_HUD")

@@ -116,6 +116,21 @@ def test_denied_request_is_counted_and_noted_once() -> None:
     source.read(0.1)
     assert source.counts["ack.denied"] == 2
     assert len([note for note in source.notes if "denied" in note]) == 1
+    assert "attitude_rate_hz" in source.notes[-1]
+
+
+def test_denials_while_depth_sources_are_tried_are_not_noted() -> None:
+    source, link, vehicle = start(depth_source="auto")
+    link.incoming += [vehicle.heartbeat(), vehicle.ack(dialect.MAV_RESULT_DENIED)]
+    source.read(0.1)
+    link.incoming += [vehicle.pressure(ms, 1100.0) for ms in range(1000, 5000, 500)]
+    source.read(0.1)
+    source.read(0.1)
+    assert source.counts["ack.denied"] == 1
+    assert not [note for note in source.notes if "denied" in note]
+    link.incoming.append(vehicle.ack(dialect.MAV_RESULT_DENIED))
+    source.read(0.1)
+    assert len([note for note in source.notes if "denied" in note]) == 1
 
 
 def test_estimates_go_out_by_name() -> None:

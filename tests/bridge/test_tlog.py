@@ -100,6 +100,14 @@ def test_log_without_an_autopilots_heartbeat_says_what_to_set(tmp_path: Path) ->
     assert len(read_tlog(path, KNOWN)[0]) == 100
 
 
+def test_what_stands_before_the_first_heartbeat_is_used(tmp_path: Path) -> None:
+    path = tmp_path / "late.tlog"
+    path.write_bytes(b"".join(steady()) + record(NOW + 5_000_000, Vehicle().heartbeat()))
+    measurements, counts, _ = read_tlog(path, MavlinkMap())
+    assert len(measurements) == 100
+    assert counts["refused.no_vehicle_yet"] == 0
+
+
 def test_file_without_mavlink_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "dive.tlog"
     path.write_bytes((DATA / "small.BIN").read_bytes())

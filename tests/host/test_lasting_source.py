@@ -29,6 +29,7 @@ class Scripted:
 
     def __init__(self, boots: list[int]) -> None:
         self.counts: Counter[str] = Counter()
+        self.notes: list[str] = []
         self.boots = boots
         self.published: list[float] = []
         self.is_closed = False
