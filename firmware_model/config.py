@@ -1,57 +1,117 @@
-"""Settings of the estimator."""
+"""Settings of the estimators."""
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 from firmware_model.state import require
 
+LONGEST_ROBUST_STEP = 10.0  # s; beyond it an interval would take more than a hundred sub-steps
+
+
+def _require_innovation_length(p: int) -> None:
+    require(1 <= p <= 64, "innovation_length must be from 1 to 64", p)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EstimatorConfig:
+class RobustConfig:
+    """Settings of `RobustEstimator`. Raises ValueError naming the first value that breaks its rule.
+
+    The prior is that of a vehicle whose pitch answers within about `pitch_time` and which moves at about the
+    configured speed; it is weak, and a factor of three either way does no harm.
+    """
+
+    innovation_length: int = 1  # p, steps in which each sample is used, 1 to 64; more only costs time
+    pitch_time: float = 1.0  # s, above 0: time in which pitch answers the plane, roughly
+    typical_rudder: float = 0.25  # rad (or the rudder's own unit), above 0: a large movement of it
+    # Highest noise to expect of the sensors, standard deviation: the level itself is learnt. Too low a value
+    # makes the first estimates too sure of themselves, a value three times too high costs nothing.
+    pitch_noise: float = 0.0035  # rad, above 0
+    depth_noise: float = 0.02  # m, above 0
+    speed_std: float | None = (
+        None  # m/s, 0 or more: of the configured speed; None for half of it, 0 trusts it
+    )
+    heave_pitch_rate_coupling: bool = False  # whether pitch rate acts on heave: w' = ... + c_wq q
+    drift: float = 0.0  # 0 or more: relative change of a parameter to be followed, in 100 s
+    rudder_hold: float = 1.0  # s, 0 or more: how long a rudder that is not measured is taken as held
+    rest_time: float = 30.0  # s, above 0: without excitation for so long, the vehicle is at rest
+
+    def __post_init__(self) -> None:
+        _require_innovation_length(self.innovation_length)
+        for name in ("pitch_time", "typical_rudder", "pitch_noise", "depth_noise", "rest_time"):
+            value = getattr(self, name)
+            require(0.0 < value < math.inf, f"{name} must be above 0 and finite", value)
+        for name in ("drift", "rudder_hold"):
+            value = getattr(self, name)
+            require(0.0 <= value < math.inf, f"{name} must be 0 or more and finite", value)
+        is_known = self.speed_std is None or 0.0 <= self.speed_std < math.inf
+        require(is_known, "speed_std must be 0 or more and finite", self.speed_std)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MilsConfig:
     """Settings of `VerticalPlaneEstimator`. Raises ValueError naming the first value that breaks its rule."""
 
-    step: float  # s, interval of the time grid, above 0
-    speed: float  # m/s, forward speed through the water where none is measured, above 0
     innovation_length: int = 5  # p, rows used in each step, 1 to 64; 1 is ordinary RLS
     pitch_forgetting_time: float | None = None  # s, memory of the pitch channel; None or inf never forgets
     depth_forgetting_time: float | None = None  # s, the same for the depth channel
     p0: float = 1e6  # P(0) = p0 I, above 0
     covariance_cap: float | None = None  # largest P_ii that forgetting may lead to; None for p0
-    excitation_threshold: float = 0.005  # rad; below it both rudder and pitch are at rest. 0 learns always
+    speed_time: float = 60.0  # s, averaging time of the measured speed
+
+    def __post_init__(self) -> None:
+        _require_innovation_length(self.innovation_length)
+        for name in ("p0", "speed_time", "pitch_forgetting_time", "depth_forgetting_time", "covariance_cap"):
+            value = getattr(self, name)
+            require(value is None or value > 0.0, f"{name} must be above 0", value)
+        for name in ("p0", "speed_time"):
+            require(getattr(self, name) < math.inf, f"{name} must be finite", getattr(self, name))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EstimatorConfig:
+    """Settings of an estimator. Raises ValueError naming the first value that breaks its rule.
+
+    method  robust: prediction errors of the equations of motion, stands sensor noise (`RobustEstimator`)
+            mils: multi-innovation least squares on the paper's CAR rows (`VerticalPlaneEstimator`)
+    """
+
+    method: Literal["robust", "mils"] = "robust"
+    step: float  # s, interval of the time grid, above 0
+    speed: float  # m/s, forward speed through the water where none is measured, above 0
+    excitation_threshold: float = (
+        0.005  # rad; while the rudder moves less, there is little to learn. 0: always
+    )
     excitation_time: float = 5.0  # s, averaging time of the excitation
-    # Standard deviations of the innovation; None or inf refuses none. A sampled rudder step can reach ten:
-    # a narrower gate refuses the very samples that tell most.
+    # Standard deviations of the innovation; None or inf refuses none. A sampled rudder step can reach ten in
+    # CAR rows: a narrower gate refuses the very samples that tell most.
     outlier_gate: float | None = 20.0
     outlier_limit: int = 5  # outliers in a row that are refused before they are believed, at least 1
     pitch_resolution: float = 1e-4  # rad, of the sensor
     depth_resolution: float = 1e-3  # m, of the sensor
-    speed_time: float = 60.0  # s, averaging time of the measured speed
     valid_below: float = 0.1  # a parameter becomes valid below this relative standard deviation
     invalid_above: float = 0.2  # and stops being valid above this one
+    robust: RobustConfig = RobustConfig()
+    mils: MilsConfig = MilsConfig()
 
     def __post_init__(self) -> None:
         for name in (
             "step",
             "speed",
-            "p0",
             "excitation_time",
             "outlier_gate",
             "pitch_resolution",
             "depth_resolution",
-            "speed_time",
             "valid_below",
-            "pitch_forgetting_time",
-            "depth_forgetting_time",
-            "covariance_cap",
         ):
             value = getattr(self, name)
             require(value is None or value > 0.0, f"{name} must be above 0", value)
-        for name in ("step", "speed", "p0", "excitation_time", "speed_time"):
+        for name in ("step", "speed", "excitation_time"):
             require(getattr(self, name) < math.inf, f"{name} must be finite", getattr(self, name))
         require(
-            1 <= self.innovation_length <= 64,
-            "innovation_length must be from 1 to 64",
-            self.innovation_length,
+            self.method != "robust" or self.step <= LONGEST_ROBUST_STEP,
+            f"step must be at most {LONGEST_ROBUST_STEP:g} s with method robust",
+            self.step,
         )
         require(self.outlier_limit >= 1, "outlier_limit must be at least 1", self.outlier_limit)
         require(

@@ -1,5 +1,6 @@
 """What the estimator believes, and how far it may be believed."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -15,13 +16,12 @@ class Estimate:
     a1, a2    1/s        heave and pitch damping
     a3        1/s^2      pitch restoring moment
     b1, b2    m/s^2/rad, 1/s^2  heave force and pitch moment of the stern plane
-    u0        m/s        forward speed used: slow average of the measured one, else the configured one
-    std       standard deviation of each, with white noise in the CAR rows; that of u0 is the spread of the
-              measured speed, 0 if it is configured, and is not carried into the others
-    valid     by parameter, with hysteresis in the relative standard deviation
-    car_pitch alpha1..alpha3        car_depth  beta1..beta7, both as in the paper
-    samples   accepted              updates    of them, samples that something was learnt from
-    refused   samples by cause      seconds    of data learnt from
+    u0        m/s        forward speed: slow average of the measured one, else estimated (robust) or
+    configured c_wq      m/s per rad  heave force of the pitch rate, w' = ... + c_wq q; NaN where it is not
+    estimated std       standard deviation of each; of a measured speed its spread, of a configured one 0
+    valid     by parameter, with hysteresis in the relative standard deviation car_pitch alpha1..alpha3
+    car_depth  beta1..beta7, both as in the paper samples   accepted              updates    of them, samples
+    that something was learnt from refused   samples by cause      seconds    of data learnt from
     """
 
     a1: float
@@ -30,6 +30,7 @@ class Estimate:
     b1: float
     b2: float
     u0: float
+    c_wq: float = math.nan
     std: Mapping[str, float]
     valid: Mapping[str, bool]
     car_pitch: tuple[float, ...]
@@ -42,5 +43,6 @@ class Estimate:
 
     @property
     def values(self) -> dict[str, float]:
-        """a1, a2, a3, b1, b2 and u0 by name."""
-        return {name: getattr(self, name) for name in (*PARAMETERS, "u0")}
+        """a1, a2, a3, b1, b2 and u0 by name; c_wq where it is estimated."""
+        extra = () if math.isnan(self.c_wq) else ("c_wq",)
+        return {name: getattr(self, name) for name in (*PARAMETERS, "u0", *extra)}

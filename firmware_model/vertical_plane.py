@@ -1,4 +1,4 @@
-"""Both channels of the vertical plane, sample by sample on the time grid."""
+"""Both channels of the paper's CAR model, sample by sample on the time grid."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -14,32 +14,27 @@ from firmware_model.estimate import PARAMETERS, Estimate
 from firmware_model.excitation import MovingVariance
 from firmware_model.mils import Mils
 from firmware_model.sample import Sample
-from firmware_model.state import count_of, finite_numbers, require
+from firmware_model.state import finite_numbers, require
 from firmware_model.status import Status
+from firmware_model.tally import Tally
+from firmware_model.time_grid import TimeGrid
+from firmware_model.validity import Validity
 
 SCHEMA = 1
-GRID_TOLERANCE = 0.1
-"""Largest distance of a sample from the grid, in steps."""
 CHECK_PERIOD_S = 1.0
 """Time between two checks of which parameters are valid."""
-REFUSALS = {
-    Status.REFUSED_NON_FINITE: "non_finite",
-    Status.REFUSED_STALE: "stale",
-    Status.REFUSED_OFF_GRID: "off_grid",
-    Status.REFUSED_OUTLIER: "outlier",
-    Status.FAULT_NUMERICAL: "numerical",
-}
 
 
 class VerticalPlaneEstimator:
-    """Estimates a1, a2, a3, b1, b2 from depth, pitch and stern plane while they come in.
+    """Estimates a1, a2, a3, b1, b2 by multi-innovation least squares on the rows of the CAR model.
 
-    The grid starts at the first sample and goes on from each accepted one. Instants without a sample, and
-    values that are NaN, are missing: no row holds them. After a gap longer than the rows it starts anew.
+    Noise on the sensors biases it, see `RobustEstimator`. Instants without a sample, and values that are NaN,
+    are missing: no row holds them. After a gap longer than the rows it starts anew.
     """
 
     def __init__(self, config: EstimatorConfig, *, real: Callable[[float], Any] = float) -> None:
         self.config = config
+        own = config.mils
 
         def channel(
             lags: tuple[tuple[int, ...], tuple[int, ...]], memory: float | None, resolution: float
@@ -48,9 +43,7 @@ class VerticalPlaneEstimator:
             forgetting = forgetting_factor(memory, config.step)
             return Channel(
                 CarRow(*lags),
-                Mils(
-                    n, config.innovation_length, forgetting, config.p0, cap=config.covariance_cap, real=real
-                ),
+                Mils(n, own.innovation_length, forgetting, own.p0, cap=own.covariance_cap, real=real),
                 gate=math.inf if config.outlier_gate is None else config.outlier_gate,
                 limit=config.outlier_limit,
                 resolution=resolution,
@@ -58,24 +51,18 @@ class VerticalPlaneEstimator:
             )
 
         self._delta = DeltaCoordinates(config.step)
-        self._pitch = channel(PITCH_LAGS, config.pitch_forgetting_time, config.pitch_resolution)
-        self._depth = channel(DEPTH_LAGS, config.depth_forgetting_time, config.depth_resolution)
+        self._pitch = channel(PITCH_LAGS, own.pitch_forgetting_time, config.pitch_resolution)
+        self._depth = channel(DEPTH_LAGS, own.depth_forgetting_time, config.depth_resolution)
         self._span = max(self._pitch.row.span, self._depth.row.span)
+        self._grid = TimeGrid(config.step, self._span)
         window = config.excitation_time / config.step
         self._rudder_motion = MovingVariance(window)
         self._pitch_motion = MovingVariance(window)
-        self._speed = MovingVariance(config.speed_time / config.step)
+        self._speed = MovingVariance(own.speed_time / config.step)
         self._check_period = max(1, round(CHECK_PERIOD_S / config.step))
-        self._valid = dict.fromkeys(PARAMETERS, False)
-        self._refused = dict.fromkeys(REFUSALS.values(), 0)
+        self._validity = Validity(PARAMETERS, config.valid_below, config.invalid_above)
+        self._tally = Tally()
         self._is_frozen = False
-        self._clear()
-
-    def _clear(self) -> None:
-        self._t_us: int | None = None
-        self._samples = 0
-        self._updates = 0
-        self._status = Status.WAITING
 
     def update(self, sample: Sample) -> Status:
         """Takes one sample. Never raises; a refused sample changes nothing but its count.
@@ -84,39 +71,31 @@ class VerticalPlaneEstimator:
         channels learn, and the more serious status of the two is returned.
         """
         status = self._update(sample)
-        if status in REFUSALS:
-            self._refused[REFUSALS[status]] += 1
-        self._status = status
+        self._tally.note(status)
         return status
 
     def _update(self, sample: Sample) -> Status:
         for value in (sample.depth, sample.pitch, sample.rudder, sample.speed, sample.pitch_rate):
             if math.isinf(value):
                 return Status.REFUSED_NON_FINITE
-        missed = 0
-        if self._t_us is not None:
-            if sample.t_us <= self._t_us:
-                return Status.REFUSED_STALE
-            elapsed = (sample.t_us - self._t_us) * 1e-6 / self.config.step
-            instants = round(elapsed)
-            missed = instants - 1
-            if missed < self._span and (abs(elapsed - instants) > GRID_TOLERANCE or instants == 0):
-                return Status.REFUSED_OFF_GRID
-        self._pass_over(missed)
+        refusal = self._grid.check(sample.t_us)
+        if refusal is not None:
+            return refusal
+        self._pass_over(self._grid.missed)
         # An outlier leaves no trace: only a row without a gap can show one, so nothing was passed over.
         pitch_is_outlier = self._pitch.face(sample.pitch)
         depth_is_outlier = self._depth.face(sample.depth)
         if (pitch_is_outlier or depth_is_outlier) and not self._is_frozen:
             return Status.REFUSED_OUTLIER
-        self._t_us = sample.t_us
-        self._samples += 1
+        self._grid.accept(sample.t_us)
+        self._tally.samples += 1
         self._rudder_motion.update(sample.rudder)
         self._pitch_motion.update(sample.pitch)
         self._speed.update(sample.speed)
         status = self._learn()
         self._pitch.push(sample.pitch, sample.rudder)
         self._depth.push(sample.depth, sample.rudder)
-        if self._samples % self._check_period == 0:
+        if self._tally.samples % self._check_period == 0:
             self._check()
         return status
 
@@ -139,26 +118,24 @@ class VerticalPlaneEstimator:
         if self._rudder_motion.std < threshold and self._pitch_motion.std < threshold:
             return Status.NOT_EXCITED
         statuses = (self._pitch.learn(), self._depth.learn())
-        self._updates += 1
+        self._tally.updates += 1
         for status in (Status.FAULT_NUMERICAL, Status.CAPPED):
             if status in statuses:
                 return status
         return Status.UPDATED
 
     def _check(self) -> None:
-        """Parameters become valid below one relative standard deviation and invalid above a higher one.
+        """Decides what is valid.
 
-        None is valid whose channel has a damping that the step cannot show, or negative damping: noise on the
+        Nothing is whose channel has a damping that the step cannot show, or negative damping: noise on the
         sensors leads least squares there, with a small standard deviation.
         """
         values, std = self._physical()
         heave_is_damped = -1.0 < self.config.step * values.a1 < 0.0
         pitch_is_damped = -1.0 < self.config.step * values.a2 < 0.0
         for name in PARAMETERS:
-            limit = self.config.invalid_above if self._valid[name] else self.config.valid_below
-            is_precise = getattr(std, name) < limit * abs(getattr(values, name))
             is_damped = heave_is_damped if name in ("a1", "b1") else pitch_is_damped
-            self._valid[name] = is_precise and is_damped
+            self._validity.check(name, getattr(values, name), getattr(std, name), is_damped)
 
     def _physical(self) -> tuple[Physical, Physical]:
         """Values and standard deviations; NaN for those of a channel with fewer rows than parameters."""
@@ -196,14 +173,14 @@ class VerticalPlaneEstimator:
             b2=b2,
             u0=self._u0,
             std={**{name: getattr(std, name) for name in PARAMETERS}, "u0": self._speed.std},
-            valid={**self._valid, "u0": True},
+            valid={**self._validity.valid, "u0": True},
             car_pitch=self._pitch.mils.theta,
             car_depth=self._delta.beta(self._depth.mils.theta),
-            samples=self._samples,
-            updates=self._updates,
-            refused=dict(self._refused),
-            status=self._status,
-            seconds=self._updates * self.config.step,
+            samples=self._tally.samples,
+            updates=self._tally.updates,
+            refused=dict(self._tally.refused),
+            status=self._tally.status,
+            seconds=self._tally.updates * self.config.step,
         )
 
     @property
@@ -221,7 +198,7 @@ class VerticalPlaneEstimator:
 
     def forget_rows(self) -> None:
         """Joins nothing across this moment: the vehicle rebooted and its clock may start anew."""
-        self._t_us = None
+        self._grid.forget()
         self._pitch.forget_rows()
         self._depth.forget_rows()
         self._rudder_motion.reset()
@@ -233,26 +210,28 @@ class VerticalPlaneEstimator:
         self._pitch.mils.reset()
         self._depth.mils.reset()
         self._speed.reset()
-        for name in self._valid:
-            self._valid[name] = False
-        for cause in self._refused:
-            self._refused[cause] = 0
+        self._validity.reset()
+        self._tally.reset()
         self._is_frozen = False
-        self._clear()
+
+    def _settings(self) -> dict[str, object]:
+        """What a saved state must have in common with this estimator."""
+        return {
+            "schema": SCHEMA,
+            "method": "mils",
+            "step": self.config.step,
+            "innovation_length": self.config.mils.innovation_length,
+        }
 
     def state(self) -> dict[str, Any]:
         """What was learnt, as plain dicts and lists fit for JSON; without the signals under way."""
         return {
-            "schema": SCHEMA,
-            "step": self.config.step,
-            "innovation_length": self.config.innovation_length,
+            **self._settings(),
+            **self._tally.state(),
             "pitch": self._pitch.mils.state(),
             "depth": self._depth.mils.state(),
             "speed": [self._speed.mean, self._speed.variance] if math.isfinite(self._speed.mean) else [],
-            "valid": [name for name in PARAMETERS if self._valid[name]],
-            "refused": dict(self._refused),
-            "samples": self._samples,
-            "updates": self._updates,
+            "valid": self._validity.state(),
             "is_frozen": self._is_frozen,
         }
 
@@ -261,22 +240,15 @@ class VerticalPlaneEstimator:
 
         Raises ValueError, and changes nothing, if the state does not fit this estimator.
         """
-        mine = {
-            "schema": SCHEMA,
-            "step": self.config.step,
-            "innovation_length": self.config.innovation_length,
-        }
-        for name, value in mine.items():
+        for name, value in self._settings().items():
             require(state.get(name) == value, f"state.{name} must be {value}", state.get(name))
         speed = finite_numbers(state, "speed", None)
         require(len(speed) in (0, 2), "state.speed must hold mean and variance or nothing", len(speed))
         require(not speed or speed[1] >= 0.0, "state.speed must hold a variance of 0 or more", speed)
-        kinds = {"pitch": dict, "depth": dict, "refused": dict, "valid": list, "is_frozen": bool}
-        for name, kind in kinds.items():
+        for name, kind in {"pitch": dict, "depth": dict, "valid": list, "is_frozen": bool}.items():
             held = state.get(name)
             require(isinstance(held, kind), f"state.{name} must be a {kind.__name__}", held)
-        samples, updates = count_of(state, "samples"), count_of(state, "updates")
-        refused = {cause: count_of(state["refused"], cause) for cause in self._refused}
+        tally = self._tally.read(state)
         before = self._pitch.mils.state()
         self._pitch.mils.restore(state["pitch"])
         try:
@@ -288,10 +260,6 @@ class VerticalPlaneEstimator:
         self._speed.reset()
         if speed:
             self._speed.mean, self._speed.variance = speed
-        for name in PARAMETERS:
-            self._valid[name] = name in state["valid"]
-        self._refused.update(refused)
-        self._samples = samples
-        self._updates = updates
+        self._validity.restore(state["valid"])
+        self._tally.restore(tally)
         self._is_frozen = state["is_frozen"]
-        self._status = Status.WAITING

@@ -5,13 +5,14 @@ they are here to compare with the paper and with what runs on the vehicle.
 """
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
 from firmware_model.car import DEPTH_LAGS, PITCH_LAGS, CarRow
 from firmware_model.conversion import physical_from_car, physical_std_from_car
+from firmware_model.estimator import make_estimator
 from firmware_model.sample import Sample
-from firmware_model.vertical_plane import VerticalPlaneEstimator
 from host.errors import RecordingError
 from host.recording import Array, Recording
 from host.vehicle import Vehicle
@@ -95,11 +96,11 @@ def _regress(
 
 
 def run_estimator(
-    recordings: list[Recording], vehicle: Vehicle
+    recordings: list[Recording], vehicle: Vehicle, method: Literal["robust", "mils"] = "mils"
 ) -> tuple[dict[str, float], dict[str, float], dict[str, Array]]:
-    """Values, standard deviations and the history by name of the estimator that runs on the vehicle."""
-    config = replace(vehicle.estimator, step=recordings[0].step, speed=vehicle.speed)
-    estimator = VerticalPlaneEstimator(config)
+    """Values, standard deviations and the history by name of an estimator that runs on the vehicle."""
+    config = replace(vehicle.estimator, method=method, step=recordings[0].step, speed=vehicle.speed)
+    estimator = make_estimator(config)
     seen = 0
     history: dict[str, list[float]] = {name: [] for name in ESTIMATED}
     for recording in recordings:

@@ -9,8 +9,8 @@ from bridge.errors import LinkClosed
 from bridge.measurement import Measurement, Quantity
 from bridge.source import Source
 from firmware_model.estimate import PARAMETERS, Estimate
+from firmware_model.estimator import make_estimator
 from firmware_model.sample import Sample
-from firmware_model.vertical_plane import VerticalPlaneEstimator
 from host.align import Aligner
 from host.errors import HostError
 from host.journal import Journal
@@ -84,7 +84,7 @@ class LiveLoop:
             say=lambda sentence: self._note("link", sentence),
         )
         self._aligner = Aligner(vehicle.alignment)
-        self._estimator = VerticalPlaneEstimator(vehicle.estimator)
+        self._estimator = make_estimator(vehicle.estimator)
         self._started = clock()
         self._silence = SilenceWatch(vehicle.link.silence, self._started)
         self._measurements: Counter[Quantity] = Counter()
@@ -244,12 +244,14 @@ class LiveLoop:
 def published_values(estimate: Estimate) -> dict[str, float]:
     """What is known, by the names that go onto the link: a1, a1_std, ..., u0, u0_std, status, valid.
 
-    valid  sum of 1 for a1, 2 for a2, 4 for a3, 8 for b1 and 16 for b2, for those that may be relied on
+    valid  sum of 1 for a1, 2 for a2, 4 for a3, 8 for b1, 16 for b2, 32 for u0, for those to be relied on
     """
     values: dict[str, float] = {}
     for name, value in estimate.values.items():
         if isfinite(value):
             values |= {name: value, f"{name}_std": estimate.std[name]}
     values["status"] = float(estimate.status)
-    values["valid"] = float(sum(2**bit for bit, name in enumerate(PARAMETERS) if estimate.valid[name]))
+    values["valid"] = float(
+        sum(2**bit for bit, name in enumerate((*PARAMETERS, "u0")) if estimate.valid[name])
+    )
     return values

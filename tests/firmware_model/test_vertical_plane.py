@@ -12,7 +12,11 @@ from car_data import ALPHA, BETA, SPEED, STEP, TABLE_1, car_signals, random_rudd
 
 from firmware_model import PARAMETERS, EstimatorConfig, Sample, Status, VerticalPlaneEstimator
 
-CONFIG = EstimatorConfig(step=STEP, speed=SPEED)
+CONFIG = EstimatorConfig(method="mils", step=STEP, speed=SPEED)
+
+
+def with_mils(config=CONFIG, **settings):
+    return replace(config, mils=replace(config.mils, **settings))
 
 
 def samples_of(pitch, depth, rudder, start=0):
@@ -42,7 +46,7 @@ def learnt(estimator):
 
 @pytest.mark.parametrize("innovation_length", [1, 5, 8])
 def test_noise_free_data_give_table_1(innovation_length):
-    estimator = VerticalPlaneEstimator(replace(CONFIG, innovation_length=innovation_length))
+    estimator = VerticalPlaneEstimator(with_mils(innovation_length=innovation_length))
     statuses = run(estimator, dive(1200))
     assert set(statuses) == {Status.WAITING, Status.NOT_EXCITED, Status.UPDATED}
     estimate = estimator.estimate()
@@ -216,12 +220,11 @@ def test_rest_is_not_learnt_from():
 @pytest.mark.long
 @pytest.mark.parametrize("threshold", [0.005, 0.0])
 def test_a_day_at_rest_leaves_an_estimator_that_learns(threshold):
-    config = replace(
-        CONFIG,
+    config = with_mils(
+        replace(CONFIG, excitation_threshold=threshold),
         innovation_length=1,
         pitch_forgetting_time=30.0,
         depth_forgetting_time=30.0,
-        excitation_threshold=threshold,
     )
     estimator = VerticalPlaneEstimator(config)
     run(estimator, dive(600))
@@ -233,7 +236,9 @@ def test_a_day_at_rest_leaves_an_estimator_that_learns(threshold):
 
 
 def test_forgetting_is_capped_until_the_first_manoeuvre():
-    config = replace(CONFIG, pitch_forgetting_time=5.0, depth_forgetting_time=5.0, excitation_threshold=0.0)
+    config = with_mils(
+        replace(CONFIG, excitation_threshold=0.0), pitch_forgetting_time=5.0, depth_forgetting_time=5.0
+    )
     estimator = VerticalPlaneEstimator(config)
     statuses = run(estimator, samples_of(np.zeros(50), np.zeros(50), np.zeros(50)))
     assert set(statuses[4:]) == {Status.CAPPED}
@@ -244,7 +249,7 @@ def test_forgetting_follows_a_change_of_the_vehicle():
     rng = np.random.default_rng(5)
     rudder = random_rudder(rng, 1200)
     pitch, depth = car_signals(rudder, rng, 1e-5, 1e-5)
-    config = replace(CONFIG, pitch_forgetting_time=10.0, depth_forgetting_time=10.0)
+    config = with_mils(pitch_forgetting_time=10.0, depth_forgetting_time=10.0)
     forgetting, remembering = VerticalPlaneEstimator(config), VerticalPlaneEstimator(CONFIG)
     weaker = samples_of(pitch, depth, rudder / 0.5, start=1300)  # the plane now does half as much
     for estimator in (forgetting, remembering):
@@ -323,7 +328,7 @@ def test_nan_may_come_anywhere_at_any_time():
 def test_measured_speed_is_averaged_and_used():
     rng = np.random.default_rng(0)
     measured = [replace(sample, speed=2.5 + 0.2 * rng.normal()) for sample in dive(1200)]
-    estimator = VerticalPlaneEstimator(replace(CONFIG, speed=1.0, speed_time=30.0))
+    estimator = VerticalPlaneEstimator(with_mils(replace(CONFIG, speed=1.0), speed_time=30.0))
     assert estimator.estimate().u0 == 1.0
     run(estimator, measured)
     estimate = estimator.estimate()
@@ -335,7 +340,7 @@ def test_measured_speed_is_averaged_and_used():
 def test_validity_has_hysteresis():
     samples = dive(4000, noise=1e-3)
     # The relative deviation of a1 passes the band between the limits slowly; forgetting moves it about.
-    config = replace(CONFIG, depth_forgetting_time=20.0, valid_below=0.25, invalid_above=0.4)
+    config = with_mils(replace(CONFIG, valid_below=0.25, invalid_above=0.4), depth_forgetting_time=20.0)
     estimator = VerticalPlaneEstimator(config)
     inside, changes, was_valid = {True: 0, False: 0}, 0, False
     for k, sample in enumerate(samples):
@@ -414,6 +419,7 @@ def test_state_goes_through_json_and_goes_on_with_the_same_bits():
     ("change", "message"),
     [
         ({"schema": 0}, r"state.schema must be 1 \(got 0\)"),
+        ({"method": "robust"}, r"state.method must be mils \(got robust\)"),
         ({"step": 0.2}, r"state.step must be 0.1 \(got 0.2\)"),
         ({"innovation_length": 4}, r"state.innovation_length must be 5 \(got 4\)"),
         ({"speed": [1.0]}, "state.speed must hold mean and variance"),
@@ -442,9 +448,6 @@ def test_state_that_does_not_fit_is_refused_and_changes_nothing(change, message)
         ({"step": 0.0}, r"step must be above 0 \(got 0.0\)"),
         ({"step": math.inf}, r"step must be finite \(got inf\)"),
         ({"speed": -1.0}, r"speed must be above 0 \(got -1.0\)"),
-        ({"innovation_length": 0}, r"innovation_length must be from 1 to 64 \(got 0\)"),
-        ({"pitch_forgetting_time": 0.0}, r"pitch_forgetting_time must be above 0 \(got 0.0\)"),
-        ({"depth_forgetting_time": math.nan}, r"depth_forgetting_time must be above 0 \(got nan\)"),
         ({"outlier_gate": 0.0}, r"outlier_gate must be above 0 \(got 0.0\)"),
         ({"outlier_limit": 0}, r"outlier_limit must be at least 1 \(got 0\)"),
         ({"excitation_threshold": -0.1}, r"excitation_threshold must be 0 or more \(got -0.1\)"),
@@ -456,9 +459,23 @@ def test_setting_that_breaks_its_rule_is_refused(setting, message):
         replace(CONFIG, **setting)
 
 
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ({"innovation_length": 0}, r"innovation_length must be from 1 to 64 \(got 0\)"),
+        ({"p0": math.inf}, r"p0 must be finite \(got inf\)"),
+        ({"pitch_forgetting_time": 0.0}, r"pitch_forgetting_time must be above 0 \(got 0.0\)"),
+        ({"depth_forgetting_time": math.nan}, r"depth_forgetting_time must be above 0 \(got nan\)"),
+    ],
+)
+def test_setting_of_the_method_that_breaks_its_rule_is_refused(setting, message):
+    with pytest.raises(ValueError, match=message):
+        with_mils(**setting)
+
+
 def test_updates_allocate_nothing_lasting():
     samples = dive(6000, noise=1e-3)
-    estimator = VerticalPlaneEstimator(replace(CONFIG, innovation_length=2, depth_forgetting_time=60.0))
+    estimator = VerticalPlaneEstimator(with_mils(innovation_length=2, depth_forgetting_time=60.0))
     run(estimator, samples[:1000])
     gc.collect()
     blocks = sys.getallocatedblocks()

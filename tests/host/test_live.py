@@ -144,7 +144,7 @@ class Run:
             "speed": U0,
             "link": {"url": "log:script"},
             "journal": {"folder": str(folder)},
-            "estimator": {"innovation_length": 5},
+            "estimator": {"method": "mils"},
         }
         return vehicle_from_table(table | tables, file="test")
 
@@ -165,7 +165,7 @@ def test_the_paper_s_vehicle_is_recovered_recorded_and_published(tmp_path: Path)
     times = [t_us for t_us, _ in published]
     assert times == [5_000_000 + k * 1_000_000 for k in range(150)]
     assert published[-1][1]["a2"] == pytest.approx(TABLE_1["a2"], rel=1e-3)
-    assert published[-1][1]["valid"] == 31.0
+    assert published[-1][1]["valid"] == 63.0
     assert {"a1", "a1_std", "b2", "b2_std", "u0", "u0_std", "status", "valid"} <= published[-1][1].keys()
     assert all(len(name) <= 10 for _, values in published for name in values)
     assert [(e["t_us"], e["estimate"]) for e in run.journal.estimates] == published

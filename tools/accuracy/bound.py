@@ -1,0 +1,37 @@
+"""The Cramér-Rao bound: no unbiased estimator has smaller deviations on such a dive."""
+
+import numpy as np
+
+from tools.accuracy.dive import Array, Dive, simulate
+
+RELATIVE_STEP = 1e-5
+
+
+def cramer_rao(dive: Dive, speed_is_known: bool = False) -> Array:
+    """Smallest standard deviations of a1, a2, a3, b1, b2, u0 (6,), initial state and trims unknown too.
+
+    u0 has the bound NaN where the speed is known.
+    """
+    case = dive.case
+    truth = np.concatenate([case.vehicle, dive.trim, dive.start])
+
+    def outputs(unknowns: Array) -> Array:
+        states = simulate(case, unknowns[:6], dive.rudder, unknowns[8:], unknowns[6:8])
+        return states[2:]
+
+    scale = np.array([case.pitch_noise, case.depth_noise])[:, None]
+    present = np.isfinite([dive.pitch, dive.depth])
+    # Outputs are smooth in the unknowns and of order one: central differences are exact to ten digits.
+    rows = []
+    for i in range(truth.size):
+        if speed_is_known and i == 5:
+            continue
+        change = np.zeros_like(truth)
+        change[i] = RELATIVE_STEP * max(abs(truth[i]), 0.1)
+        slope = (outputs(truth + change) - outputs(truth - change)) / (2.0 * change[i])
+        rows.append((slope / scale)[present])
+    J = np.array(rows)
+    size = np.sqrt(np.sum(J**2, axis=1))
+    covariance = np.linalg.inv((J / size[:, None]) @ (J / size[:, None]).T) / np.outer(size, size)
+    std = np.sqrt(np.diag(covariance))
+    return np.concatenate([std[:5], [np.nan] if speed_is_known else std[5:6]])
