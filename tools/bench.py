@@ -22,7 +22,7 @@ def require_bench() -> None:
     if missing:
         raise MissingExtra(
             f"this command needs {', '.join(missing)}, which the companion install leaves out: "
-            "pip install 'auv-mils[bench]'"
+            "pip install '.[bench]' in its source folder"
         )
 
 
@@ -38,7 +38,6 @@ def read_all(
     needs: tuple[str, ...] = ("depth", "pitch", "rudder"),
 ) -> "list[Recording]":
     """Every stretch of every file. Raises RecordingError when they do not belong together."""
-    require_bench()
     from host.read_recordings import read_recordings
 
     read: list[Recording] = []

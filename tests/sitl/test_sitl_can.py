@@ -95,7 +95,9 @@ def test_lost_and_unencodable_samples_are_not_sent():
         ("can:", "can:INTERFACE:CHANNEL"),
         ("can:virtual", "can:INTERFACE:CHANNEL"),
         ("can:carrier_pigeon:1", "cannot be opened"),
-        ("can:socketcan:no_such_can9", "cannot be opened"),
+        ("can:socketcan:no_such_can9", "cannot be opened: .*; `mils doctor`"),
+        ("can:socketcand:127.0.0.1", "must be can:socketcand:HOST:PORT:CHANNEL"),
+        ("can:udp_multicast:1.2.3.4:43200", "cannot be opened"),
     ],
 )
 def test_bus_that_does_not_exist_is_refused_in_one_line(url, says):

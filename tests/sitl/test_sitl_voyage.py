@@ -175,15 +175,15 @@ def test_signal_stops_cleanly_and_keeps_the_record(tmp_path: Path, listener, num
     ("words", "error", "says"),
     [
         (("--scenario", "no_such"), ConfigError, "no_such cannot be read"),
-        (("--speed", "0"), ConfigError, "--speed must be > 0"),
-        (("--speed", "nan"), ConfigError, "--speed must be > 0"),
-        (("--duration", "-1"), ConfigError, "--duration must be >= 0"),
+        (("--speed", "0"), ConfigError, "--speed must be a number > 0"),
+        (("--speed", "inf"), ConfigError, "--speed must be a number > 0"),
+        (("--duration", "-1"), ConfigError, "--duration must be a number >= 0"),
         (("--seed", "-1"), ConfigError, "--seed must be >= 0"),
         (("--link", "none"), ConfigError, "--record or --truth"),
         (("--link", "none", "--duration", "0", "--record", "x.csv"), ConfigError, "duration_s must be > 0"),
         (("--link", "pigeon:1"), LinkError, "link must begin with"),
         (("--link", "can:socketcan:no_such9"), LinkError, "cannot be opened"),
-        (("--link", "serial:/dev/no_such_tty:57600"), LinkError, "cannot be opened"),
+        (("--link", "serial:/dev/no_such_tty:57600"), LinkError, "opened: No such file or directory;"),
     ],
 )
 def test_bad_usage_is_one_line(words, error, says):

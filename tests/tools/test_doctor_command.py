@@ -34,7 +34,7 @@ def test_a_missing_dependency_is_an_answer_of_no(
 ) -> None:
     monkeypatch.setitem(doctor.CORE, "no_such_module", "no-such-module")
     assert diagnose() == 1
-    assert "pip install auv-mils" in line_of(capsys.readouterr().out, "no-such-module")
+    assert "pip install ." in line_of(capsys.readouterr().out, "no-such-module")
 
 
 def test_missing_extras_devices_and_compiler_do_no_harm(
@@ -50,7 +50,7 @@ def test_missing_extras_devices_and_compiler_do_no_harm(
     assert diagnose() == 0
     output = capsys.readouterr().out
     for name, remedy in [
-        ("no_such_module", "pip install 'auv-mils[bench]'"),
+        ("no_such_module", "pip install '.[bench]'"),
         ("C compiler", "apt install gcc"),
         ("serial devices", "plug the autopilot in"),
         ("CAN in the kernel", "modprobe can_raw"),

@@ -35,7 +35,9 @@ from tools.sitl.scenario import parse
 
 DATA = Path(__file__).parents[1] / "data"
 TLOG = DATA / "ardusub" / "small.tlog"
-MAVLINK = MavlinkMap(rudder=(ServoTerm(channel=1, rad_per_us=0.001),), surface_pressure_hpa=1013.25)
+MAVLINK = MavlinkMap(
+    system_id=1, rudder=(ServoTerm(channel=1, rad_per_us=0.001),), surface_pressure_hpa=1013.25
+)
 
 
 def run(*words: str) -> int:

@@ -68,9 +68,9 @@ def _tell(check: Check) -> bool:
 def _machine() -> Iterator[Check]:
     yield _python()
     for module, distribution in CORE.items():
-        yield _dependency(module, distribution, "pip install auv-mils", is_needed=True)
+        yield _dependency(module, distribution, "in the source folder: pip install .", is_needed=True)
     for module in BENCH:
-        remedy = "for identify, simulate, predict: pip install 'auv-mils[bench]'"
+        remedy = "for identify, simulate, predict; in the source folder: pip install '.[bench]'"
         yield _dependency(module, module, remedy, is_needed=False)
     yield _compiler()
     yield _serial_devices()

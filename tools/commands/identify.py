@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from tools.bench import joint_or_each, load_vehicle, progress, read_all
+from tools.bench import joint_or_each, load_vehicle, progress, read_all, require_bench
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    require_bench()
     from host.identify import identify
     from host.model import write_model
     from host.report import advice, verdict, write_report

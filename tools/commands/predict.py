@@ -4,7 +4,7 @@ import argparse
 import json
 from pathlib import Path
 
-from tools.bench import load_vehicle, read_all
+from tools.bench import load_vehicle, read_all, require_bench
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -15,6 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    require_bench()
     import numpy as np
 
     from host.model import read_model

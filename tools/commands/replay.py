@@ -1,7 +1,6 @@
 """`mils replay`: a log as the live frames of a vehicle."""
 
 import argparse
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -14,6 +13,7 @@ from bridge.link import Link, Packet
 from host.errors import ConfigError
 from host.vehicle import Vehicle, default_vehicle, read_vehicle
 from tools.sitl.schedule import Pace
+from tools.status_line import StatusLine
 from tools.stop_signals import stop_signals
 
 HELP = "a log as live frames"
@@ -66,9 +66,8 @@ def run(args: argparse.Namespace) -> int:
     try:
         with stop_signals() as stop:
             player = Player(link, args.speed, time.monotonic, stop.is_set)
-            status = _Status(player, args.quiet)
-            if not args.quiet:
-                print(f"{args.log} on {args.link}, {args.speed:g} times real time. Ctrl-C stops.", flush=True)
+            status = StatusLine(player.describe, args.quiet)
+            status.begin(f"{args.log} on {args.link}, {args.speed:g} times real time. Ctrl-C stops.")
             player.play(frames(), status.tell)
             while args.loop and not stop.is_set():
                 player.play(frames(), status.tell)
@@ -91,6 +90,9 @@ class Player:
         self.t_s = 0.0
         self.sent = 0
 
+    def describe(self) -> str:
+        return f"t {self.t_s:8.1f} s  sent {self.sent}"
+
     def play(self, frames: Iterator[tuple[float, Packet]], tell: Callable[[], None]) -> None:
         """Sends all of `frames`, or until stopped; `tell` is called often."""
         pace = Pace(self.speed, self.clock)
@@ -106,28 +108,6 @@ class Player:
             self.link.write(packet)
             self.t_s = due_s
             self.sent += 1
-
-
-class _Status:
-    """One line a second, rewritten in place on a terminal; elsewhere only the last one is printed."""
-
-    def __init__(self, player: Player, quiet: bool) -> None:
-        self.player = player
-        self.quiet = quiet
-        self.is_terminal = sys.stdout.isatty()
-        self.next = time.monotonic()
-
-    def line(self) -> str:
-        return f"t {self.player.t_s:8.1f} s  sent {self.player.sent}"
-
-    def tell(self) -> None:
-        if self.is_terminal and not self.quiet and time.monotonic() >= self.next:
-            self.next += 1.0
-            print(f"\r{self.line()}\033[K", end="", flush=True)
-
-    def finish(self) -> None:
-        if not self.quiet:
-            print(f"\r{self.line()}\033[K" if self.is_terminal else self.line(), flush=True)
 
 
 def _demonstration() -> Vehicle:

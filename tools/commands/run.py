@@ -111,14 +111,11 @@ def _stopped_by_signals(loop: LiveLoop) -> Iterator[None]:
 
     for name in names:
         signal.signal(name, stop)
-    # A reader that goes away (TCP peer, `mils run | head`) must not end the recording.
-    pipe = signal.signal(signal.SIGPIPE, signal.SIG_IGN)
     try:
         yield
     finally:
         for name in names:
             signal.signal(name, before[name])
-        signal.signal(signal.SIGPIPE, pipe)
 
 
 class _Display:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from tools.bench import load_vehicle, read_all
+from tools.bench import load_vehicle, read_all, require_bench
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -16,6 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    require_bench()
     from host.model import read_model
     from host.simulate import simulate, write_simulation
 

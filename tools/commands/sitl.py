@@ -1,7 +1,6 @@
 """`mils sitl`: a simulated AUV that speaks MAVLink or CAN, or fills a recording."""
 
 import argparse
-import sys
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -29,6 +28,7 @@ from tools.sitl.scenario import SCENARIOS, Scenario, load
 from tools.sitl.schedule import Pace
 from tools.sitl.track import Track
 from tools.sitl.voyage import Vehicle, sail_live
+from tools.status_line import StatusLine
 from tools.stop_signals import stop_signals
 
 HELP = "a simulated AUV that speaks MAVLink or CAN"
@@ -57,9 +57,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Simulates; 0 when the run is over or was stopped. Raises ConfigError, LinkError."""
     if not (isfinite(args.speed) and args.speed > 0.0):
-        raise ConfigError(f"--speed must be > 0 (got {args.speed})")
+        raise ConfigError(f"--speed must be a number > 0 (got {args.speed})")
     if args.duration is not None and not (isfinite(args.duration) and args.duration >= 0.0):
-        raise ConfigError(f"--duration must be >= 0 s (got {args.duration})")
+        raise ConfigError(f"--duration must be a number >= 0 s (got {args.duration})")
     if args.seed is not None and args.seed < 0:
         raise ConfigError(f"--seed must be >= 0 (got {args.seed})")
     try:
@@ -113,11 +113,8 @@ def _speak(scenario: Scenario, seed: int, args: argparse.Namespace) -> int:
             transport = open_transport(args.link)
             stack.callback(transport.close)
             vehicle = MavlinkVehicle(scenario, seed, track, transport, note)
-        status = _Status(track, vehicle, args.quiet)
-        if not args.quiet:
-            print(
-                f"{scenario.name}: {args.link}, speed {args.speed:g}, seed {seed}. Ctrl-C stops.", flush=True
-            )
+        status = StatusLine(lambda: _describe(track.now, vehicle), args.quiet)
+        status.begin(f"{scenario.name}: {args.link}, speed {args.speed:g}, seed {seed}. Ctrl-C stops.")
         sail_live(
             track, vehicle, Pace(args.speed, time.monotonic), scenario.duration_s, stop.is_set, status.tell
         )
@@ -125,32 +122,12 @@ def _speak(scenario: Scenario, seed: int, args: argparse.Namespace) -> int:
     return 0
 
 
-class _Status:
-    """One line a second, rewritten in place on a terminal; elsewhere only the last one is printed."""
-
-    def __init__(self, track: Track, vehicle: Vehicle, quiet: bool) -> None:
-        self.track = track
-        self.vehicle = vehicle
-        self.quiet = quiet
-        self.is_terminal = sys.stdout.isatty()
-        self.next = time.monotonic()
-
-    def line(self) -> str:
-        now = self.track.now
-        return (
-            f"t {now.t_s:7.1f} s  depth {now.depth:6.2f} m  pitch {degrees(now.pitch):+6.1f} deg"
-            f"  rudder {degrees(now.command):+6.1f} deg"
-            f"  sent {self.vehicle.sent.total()}  heard {self.vehicle.heard.total()}"
-        )
-
-    def tell(self) -> None:
-        if self.is_terminal and not self.quiet and time.monotonic() >= self.next:
-            self.next += 1.0
-            print(f"\r{self.line()}\033[K", end="", flush=True)
-
-    def finish(self) -> None:
-        if not self.quiet:
-            print(f"\r{self.line()}\033[K" if self.is_terminal else self.line(), flush=True)
+def _describe(now: Instant, vehicle: Vehicle) -> str:
+    return (
+        f"t {now.t_s:7.1f} s  depth {now.depth:6.2f} m  pitch {degrees(now.pitch):+6.1f} deg"
+        f"  rudder {degrees(now.command):+6.1f} deg"
+        f"  sent {vehicle.sent.total()}  heard {vehicle.heard.total()}"
+    )
 
 
 def _truth_writer(scenario: Scenario, path: Path | None, stack: ExitStack) -> Callable[[Instant], None]:

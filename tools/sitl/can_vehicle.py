@@ -28,21 +28,28 @@ Note = Callable[[float, str, float], None]
 def open_bus(url: str) -> can.BusABC:
     """A bus by its address, INTERFACE as python-can names it. Raises TransportError.
 
-    can:INTERFACE:CHANNEL[:BITRATE]    can:socketcand:HOST:PORT:CHANNEL    can:udp_multicast[:GROUP]
+    can:INTERFACE:CHANNEL[:BITRATE]    can:socketcand:HOST:PORT:CHANNEL    can:udp_multicast[:GROUP[:PORT]]
     """
     scheme, _, rest = url.partition(":")
     interface, _, channel = rest.partition(":")
     if scheme != "can" or not interface or not (channel or interface == "udp_multicast"):
         raise TransportError(f"link must be can:INTERFACE:CHANNEL (got {url!r})")
+    if interface == "socketcand" and channel.count(":") != 2:
+        raise TransportError(f"link must be can:socketcand:HOST:PORT:CHANNEL (got {url!r})")
     try:
-        return can.Bus(interface=interface, **_bus_arguments(interface, channel))
+        # A can.conf of this machine must not say otherwise.
+        return can.Bus(interface=interface, ignore_config=True, **_bus_arguments(interface, channel))
     except Exception as error:  # every backend of python-can has classes of its own
-        raise TransportError(f"link {url} cannot be opened: {' '.join(str(error).split())}") from error
+        remedy = "; `mils doctor` says what is missing" if isinstance(error, OSError) else ""
+        cause = " ".join(str(error).split())
+        raise TransportError(f"link {url} cannot be opened: {cause}{remedy}") from error
 
 
 def _bus_arguments(interface: str, channel: str) -> dict[str, Any]:
     name, colon, number = channel.rpartition(":")
     if interface == "udp_multicast":
+        if colon and number.isdigit():
+            return {"channel": name, "port": int(number)}
         return {"channel": channel or _MULTICAST_GROUP}
     if interface == "socketcand":
         host, port, bus = channel.split(":")

@@ -1,6 +1,7 @@
 """How the simulated vehicle's bytes leave and arrive."""
 
 import contextlib
+import os
 import select
 import socket
 from collections.abc import Callable
@@ -193,4 +194,6 @@ def open_transport(url: str) -> Transport:
     try:
         return SCHEMES[scheme](rest)
     except (OSError, OverflowError, serial.SerialException) as error:
-        raise TransportError(f"link {url} cannot be opened: {error}") from error
+        number = getattr(error, "errno", None)
+        cause = os.strerror(number) if number and number > 0 else str(error)
+        raise TransportError(f"link {url} cannot be opened: {cause}; `mils doctor` checks links") from error
