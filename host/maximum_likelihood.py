@@ -26,6 +26,7 @@ Start = tuple[Array, list[Array]]
 
 # rad^2, m^2: below any sensor, so that noise-free data divide by no zero
 SMALLEST_NOISE = np.array([1e-12, 1e-10])
+ANNEALING = (0.1, 0.01, 1e-3, 1e-4)  # s, variance of the unknown force over that of all force
 NOISE_FREE = 100.0 * SMALLEST_NOISE  # what is left of noise-free data is the integration error
 
 
@@ -112,12 +113,19 @@ def fit_maximum_likelihood(
     return filtered if is_better or noise_model == "filter_error" else best
 
 
-def output_error(start: Point, inputs: list[Inputs], free: Mask, most_iterations: int = 40) -> Fit:
-    """Gauss-Newton on the free run, the noise variances concentrated out."""
+def output_error(
+    start: Point, inputs: list[Inputs], free: Mask, most_iterations: int = 40, tolerance: float = 1e-3
+) -> Fit:
+    """Gauss-Newton on the free run, the noise variances concentrated out; ends at a gain below tolerance."""
     point, damping, converged, iterations = start, 1e-3, False, 0
     parts = _innovations(point, inputs)
     noise = _residual_noise([error for error, _ in parts], inputs)
     cost = _concentrated_cost(noise, inputs)
+    if not np.isfinite(cost) or not all(np.isfinite(S).all() for _, S in parts):
+        # A start from which the model runs away: nothing can be improved from here.
+        return _finished(
+            point.with_noise(np.ones(4)), [(0 * e, 0 * S) for e, S in parts], inputs, free, -np.inf, 0, False
+        )
     while not converged and iterations < most_iterations:
         iterations += 1
         step = GaussNewton(_whitened_by(noise, parts), point, free)
@@ -131,7 +139,7 @@ def output_error(start: Point, inputs: list[Inputs], free: Mask, most_iterations
         if not trial_cost < cost:
             converged = True
             break
-        converged = cost - trial_cost < 1e-3
+        converged = cost - trial_cost < tolerance
         cost, point, noise = trial_cost, trial, trial_noise
         parts = _innovations(point, inputs)
         damping = damping / 10.0
@@ -156,6 +164,27 @@ def filter_error(start: Fit, inputs: list[Inputs], rounds: int = 6) -> Fit:
         converged = likelihood - before < 0.05
     white = _whitened_at(point, inputs)
     return _finished(point, white, inputs, start.free, likelihood, used, converged)
+
+
+def annealed(start: Point, inputs: list[Inputs], free: Mask, accelerations: tuple[float, float]) -> Point:
+    """The start moved into the right valley: Gauss-Newton while the measurements still steer the state.
+
+    With much unknown force the filter follows the measurements, and the criterion is nearly that of
+    regression, with one minimum; with little it is that of the free run. The force is let go in stages.
+
+    accelerations  rms of w' (m/s^2) and q' (rad/s^2), the size of all forces together
+    """
+    point = start
+    for share in ANNEALING:
+        forces = [share * acceleration**2 for acceleration in accelerations]
+        point = point.with_noise(np.array([*start.noise[:2], *forces]))
+        for _ in range(2):
+            with np.errstate(all="ignore"):
+                white = _whitened_at(point, inputs)
+                if not all(np.isfinite(S).all() and np.isfinite(e).all() for e, S in white):
+                    return start
+                point = GaussNewton(white, point, free).trial(1e-6)
+    return point.with_noise(start.noise)
 
 
 def _gauss_newton_filter(

@@ -7,7 +7,7 @@ from host.equations import Chain, Effect, Parameter
 
 
 def _coupling(c: Chain) -> None:
-    c.heave += c.p["c_wq"] * c.q
+    c.heave += c.p["c_wq"] * c.speed_ratio * c.q
 
 
 def _drag(c: Chain) -> None:
@@ -35,7 +35,7 @@ EFFECTS = (
         ),
         sentence="Pitching at a forward speed throws the hull sideways: the pitch rate drives heave "
         "(centripetal term m u q and Zq q), which the base model leaves out.",
-        equation="w' = ... + c_wq q",
+        equation="w' = ... + c_wq (u/u0) q",
         manoeuvre="quick plane reversals (3-2-1-1) at cruising speed, which make the pitch rate large",
         probes=((0.5,), (-0.5,)),
         scales=("speed",),

@@ -12,17 +12,24 @@ from math import log
 import numpy as np
 
 from host.catalogue import CATALOGUE, structure_of
+from host.diagnosis.first_guess import accelerations, first_guess
+from host.diagnosis.noise_floor import noise_floor
 from host.equations import NAMES, Effect
 from host.gauss_newton import GaussNewton, Point
-from host.maximum_likelihood import Fit, fit_maximum_likelihood, output_error, residuals_at
+from host.maximum_likelihood import Fit, annealed, fit_maximum_likelihood, output_error, residuals_at
 from host.propagate import Inputs, inputs_of
 from host.recording import Array, Recording
 
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis a trim offset is an effect with a name
-NAMING_MARGIN = 8.0  # of BIC, beyond which an effect pays; holds false naming down over the whole catalogue
+NAMING_MARGIN = 12.0  # of BIC, beyond which an effect pays; holds false naming down over the whole catalogue
 BEAM = 4
 PROMISING = 6
 LARGEST_SET = 5
+FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = (
+    4,
+    15,
+    0.3,
+)  # enough to rank sets; those that count are polished
 
 Names = frozenset[str]
 Progress = Callable[[str], None]
@@ -50,6 +57,8 @@ class Search:
             # Where the speed is measured its loss is data, and there is nothing in it to estimate.
             held |= {"speed_time": 1.0, "c_ud": 0.0}
         self._held = held
+        self._floor = noise_floor(recordings)
+        self._accelerations = accelerations(recordings)
         self._scale = {
             "": 1.0,
             "speed": 1.0,
@@ -83,12 +92,14 @@ class Search:
 
     def simplest(self) -> Explanation:
         """The best explanation all of whose members pay for themselves."""
+        for explanation in sorted(self._known.values(), key=lambda e: e.bic)[:BEAM]:
+            self.polished(explanation)
         best = min(self._known.values(), key=lambda e: e.bic)
         pruned = True
         while pruned and best.names:
             pruned = False
             for name in sorted(best.names):
-                smaller = self.without(best, name)
+                smaller = self.polished(self.without(best, name))
                 if smaller.bic < best.bic + NAMING_MARGIN:
                     best, pruned = smaller, True
                     break
@@ -100,15 +111,18 @@ class Search:
         if names in self._known:
             return self._known[names]
         ranked = sorted(self._probed(parent, effect), key=lambda probed: -probed[0])
-        fits = [self._fit(names, parent, effect.name, probe) for _, probe in ranked[:2]]
-        return self._remember(names, max(fits, key=lambda fit: fit.log_likelihood))
+        starts = [self._start(names, parent, effect.name, probe) for _, probe in ranked[:2]]
+        initial, noise = parent.fit.initial, parent.fit.noise
+        points = [Point(structure_of(names), start, initial, noise) for start in starts]
+        return self._remember(names, self._fit(names, [*points, self._guess(names, parent, starts[0])]))
 
     def without(self, explanation: Explanation, name: str) -> Explanation:
         """The same set without one of its effects."""
         names = explanation.names - {name}
-        if names not in self._known:
-            self._remember(names, self._fit(names, explanation))
-        return self._known[names]
+        start = self._start(names, explanation)
+        fit = explanation.fit
+        point = Point(structure_of(names), start, fit.initial, fit.noise)
+        return self._remember(names, self._fit(names, [point, self._guess(names, explanation, start)]))
 
     def swapped(self, explanation: Explanation, out: str, into: Effect) -> Explanation:
         """One effect in the place of another."""
@@ -151,9 +165,10 @@ class Search:
                 parent.fit.initial,
                 parent.fit.noise,
             )
-            white = residuals_at(point, inputs)
-            step = GaussNewton(white, point, free)
-            left = step.predicted_cost(sum(float(np.sum(e**2)) for e, _ in white))
+            with np.errstate(over="ignore", invalid="ignore"):
+                white = residuals_at(point, inputs)
+                cost = sum(float(np.sum(e**2)) for e, _ in white)
+                left = GaussNewton(white, point, free).predicted_cost(cost) if np.isfinite(cost) else np.inf
             probed.append((before - left, probe))
         return probed
 
@@ -161,7 +176,20 @@ class Search:
         scales = np.array([self._scale[scale] for scale in effect.scales or ("",) * len(effect.parameters)])
         return [np.array(probe) * scales for probe in effect.probes]
 
-    def _start(self, names: Names, parent: Explanation, added: str | None, probe: Array | None) -> Array:
+    def _guess(self, names: Names, parent: Explanation, start: Array) -> Point:
+        """The rough values of regression where it gives some, `start` elsewhere, moved into their valley."""
+        structure, inputs = structure_of(names), self._inputs_for(names)
+        rough = first_guess(self.recordings, self._scale["speed"], names)
+        rough = {name: value for name, value in rough.items() if name not in self._held}
+        values = np.array([rough.get(name, own) for name, own in zip(structure.names, start, strict=True)])
+        noise = np.array([*self._floor, 0.0, 0.0])
+        point = Point(structure, values, parent.fit.initial, noise)
+        free = np.array([name not in self._held for name in structure.names])
+        return annealed(point, inputs, free, self._accelerations)
+
+    def _start(
+        self, names: Names, parent: Explanation, added: str | None = None, probe: Array | None = None
+    ) -> Array:
         known = dict(zip(parent.fit.structure.names, parent.fit.parameters, strict=True))
         if added is not None and probe is not None:
             effect = next(effect for effect in CATALOGUE if effect.name == added)
@@ -169,15 +197,22 @@ class Search:
         known |= {name: value for name, value in self._held.items() if name in known}
         return np.array([known[name] for name in structure_of(names).names])
 
-    def _fit(
-        self, names: Names, parent: Explanation, added: str | None = None, probe: Array | None = None
-    ) -> Fit:
-        structure = structure_of(names)
+    def _fit(self, names: Names, starts: list[Point]) -> Fit:
+        """Goes a few steps from every start and on from the best."""
+        structure, inputs = structure_of(names), self._inputs_for(names)
         free = np.array([name not in self._held for name in structure.names])
-        start = Point(
-            structure, self._start(names, parent, added, probe), parent.fit.initial, parent.fit.noise
+        fits = [output_error(start, inputs, free, FIRST_ITERATIONS, TOLERANCE) for start in starts]
+        best = max(fits, key=lambda fit: fit.log_likelihood)
+        on = Point(structure, best.parameters, best.initial, best.noise)
+        return best if best.converged else output_error(on, inputs, free, MOST_ITERATIONS, TOLERANCE)
+
+    def polished(self, explanation: Explanation) -> Explanation:
+        """The same set, its fit carried on until nothing more is gained."""
+        fit = explanation.fit
+        start = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+        return self._remember(
+            explanation.names, output_error(start, self._inputs_for(explanation.names), fit.free)
         )
-        return output_error(start, self._inputs_for(names), free)
 
     def _inputs_for(self, names: Names) -> list[Inputs]:
         if names not in self._inputs:
@@ -187,5 +222,6 @@ class Search:
 
     def _remember(self, names: Names, fit: Fit) -> Explanation:
         bic = -2.0 * fit.log_likelihood + self.free_parameters(names) * log(fit.samples)
-        self._known[names] = Explanation(names, fit, bic)
+        if names not in self._known or bic < self._known[names].bic:
+            self._known[names] = Explanation(names, fit, bic)
         return self._known[names]
