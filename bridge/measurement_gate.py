@@ -5,14 +5,14 @@ from math import isfinite, pi
 
 from bridge.measurement import Measurement, Quantity
 
-# Larger values are no vehicle's: a wrong unit or a corrupt field.
-_LIMIT = {
+LARGEST = {
     Quantity.DEPTH: 12e3,
     Quantity.PITCH: pi,
-    Quantity.RUDDER: 1e3,
+    Quantity.RUDDER: 1e4,  # may be a battery's position or a pulse width
     Quantity.SPEED: 50.0,
     Quantity.PITCH_RATE: 50.0,
 }
+"""By quantity, in SI: larger values are no vehicle's, but a wrong unit or a corrupt field."""
 
 
 class MeasurementGate:
@@ -28,7 +28,7 @@ class MeasurementGate:
         if not isfinite(value):
             self._counts["refused.non_finite"] += 1
             return
-        if abs(value) > _LIMIT[quantity]:
+        if abs(value) > LARGEST[quantity]:
             self._counts["refused.range"] += 1
             return
         latest = self._latest.get((quantity, source))

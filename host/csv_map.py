@@ -26,6 +26,8 @@ class CsvColumn:
     def __post_init__(self) -> None:
         if self.sign not in (1, -1):
             raise ValueError(f"sign must be 1 or -1 (got {self.sign})")
+        if self.scale == 0.0:
+            raise ValueError(f"scale must not be 0 (got {self.scale})")
 
 
 def _in_si(column: str, unit: str) -> CsvColumn:

@@ -6,30 +6,35 @@ from pathlib import Path
 
 import numpy as np
 
+from bridge.measurement import Quantity
+from bridge.measurement_gate import LARGEST
 from host.csv_map import UNITS, CsvColumn, CsvMap
 from host.errors import RecordingError
 from host.recording import NEEDED, Array, Recording, file_sha256, split_at_gaps
 
 CHANNELS = ("depth", "pitch", "rudder", "speed", "pitch_rate")
+_MANY = 0.1  # share of a column
 
 
 def read_csv_recording(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> list[Recording]:
-    """Reads a text recording; several stretches when it has gaps.
+    """Reads a text recording, separated by comma, semicolon or tab; several stretches when it has gaps.
 
     Rows whose time is missing, repeated or runs backwards are dropped and counted; any other cell that is
     empty or not a finite number is "not measured". Raises RecordingError with one line when the file is
     empty, is no text, lacks a column, or holds no usable stretch.
     """
-    header, rows = _read_rows(path)
+    header, rows, decimal = _read_rows(path)
     counts: Counter[str] = Counter(rows=len(rows))
     values: dict[str, Array] = {}
     for quantity in ("time", *CHANNELS):
         column: CsvColumn = getattr(columns, quantity)
-        if column.column in header:
-            raw = _numbers(rows, header.index(column.column))
-            factor = column.sign * UNITS[quantity][column.unit] * column.scale
-            values[quantity] = raw * factor + column.offset
+        found = header.count(column.column)
+        if found == 1:
+            raw = _numbers(rows, header.index(column.column), decimal)
             counts[f"missing.{quantity}"] = int(np.isnan(raw).sum())
+            values[quantity] = _in_si(path, quantity, column, raw, counts)
+        elif found > 1:
+            raise RecordingError(f"{path}: column {column.column!r} is in the file {found} times; keep one")
         elif quantity in CHANNELS and quantity not in needs:
             values[quantity] = np.full(len(rows), np.nan)
         else:
@@ -64,30 +69,54 @@ def read_csv_recording(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEE
     return pieces
 
 
-def _read_rows(path: Path) -> tuple[list[str], list[list[str]]]:
+def _read_rows(path: Path) -> tuple[list[str], list[list[str]], str]:
+    """Header, rows and decimal mark; the separator is the one that the header has most of."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            lines = list(csv.reader(line for line in file if not line.startswith("#")))
-    except (UnicodeDecodeError, csv.Error) as error:
+            text = [line for line in file if not line.startswith("#")]
+        separator = max(",;\t", key=text[0].count) if text else ","
+        lines = list(csv.reader(text, delimiter=separator))
+    except UnicodeDecodeError as error:
         raise RecordingError(
-            f"{path}: is not a text table ({error.__class__.__name__}); give a .csv with a header row"
+            f"{path}: is not UTF-8 text (byte {error.start}); give a .csv with a header row, saved as UTF-8"
+        ) from error
+    except csv.Error as error:
+        raise RecordingError(
+            f"{path}: is not a text table ({error}); give a .csv with a header row"
         ) from error
     if not lines:
         raise RecordingError(f"{path}: is empty; a recording has a header row and one row per instant")
     header = [name.strip() for name in lines[0]]
-    return header, [row for row in lines[1:] if row]
+    decimal = "," if separator == ";" else "."  # as spreadsheets write where the comma is the decimal mark
+    return header, [row for row in lines[1:] if row], decimal
 
 
-def _numbers(rows: list[list[str]], index: int) -> Array:
+def _numbers(rows: list[list[str]], index: int, decimal: str) -> Array:
     def number(row: list[str]) -> float:
         try:
-            return float(row[index])
+            return float(row[index].replace(decimal, "."))
         except (ValueError, IndexError):
             return np.nan
 
     column = np.array([number(row) for row in rows], dtype=float)
     column[~np.isfinite(column)] = np.nan
     return column
+
+
+def _in_si(path: Path, quantity: str, column: CsvColumn, raw: Array, counts: Counter[str]) -> Array:
+    """Values that no vehicle has are counted and not measured; many of them mean a wrong unit."""
+    values: Array = raw * (column.sign * UNITS[quantity][column.unit] * column.scale) + column.offset
+    if quantity == "time":
+        return values
+    limit = LARGEST[Quantity(quantity)]
+    beyond = np.abs(values) > limit
+    if beyond.sum() > _MANY * np.isfinite(values).sum():
+        raise RecordingError(
+            f"{path}: {quantity} must be within {limit:.4g} in SI units (got up to {np.nanmax(abs(values)):.4g} "
+            f"from {column.column!r} in {column.unit!r}); set unit and scale under [csv.{quantity}]"
+        )
+    counts[f"refused.range.{quantity}"] = int(beyond.sum())
+    return np.where(beyond, np.nan, values)
 
 
 def _advancing(time: Array, counts: Counter[str]) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

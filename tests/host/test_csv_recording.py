@@ -91,7 +91,7 @@ def test_speed_with_holes_is_bridged_and_mostly_missing_is_no_speed(tmp_path: Pa
     ("content", "message"),
     [
         (b"", "is empty"),
-        (b"\x00\xff\xfe\x80garbage" * 50, "is not a text table"),
+        (b"\x00\xff\xfe\x80garbage" * 50, "is not UTF-8 text"),
         (b"time_s,depth_m,pitch_rad\n0,1,2\n", "column 'rudder_rad' for rudder is not in the file"),
         (HEADER.encode() + b"\n0,1,0,0\n", "only 1 rows"),
         (HEADER.encode() + b"\n" + b"\n".join(b"%d,,,0" % k for k in range(20)), "no stretch of 10 rows"),
@@ -105,3 +105,48 @@ def test_bad_file_says_what_is_wrong_in_one_line(tmp_path: Path, content: bytes,
         read_csv_recording(path, CsvMap())
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_other_separators_are_read(tmp_path: Path, separator: str) -> None:
+    """Semicolons come with decimal commas."""
+    text = "\n".join([HEADER, *rows(20)]).replace(",", separator)
+    path = tmp_path / "a.csv"
+    path.write_text(text.replace(".", ",") if separator == ";" else text)
+    (recording,) = read_csv_recording(path, CsvMap())
+    assert recording.depth[3] == pytest.approx(10.03)
+    assert recording.rudder[3] == pytest.approx(0.1)
+
+
+def test_single_values_that_no_vehicle_has_are_not_measured(tmp_path: Path) -> None:
+    lines = rows(50)
+    lines[7] = "0.700,-99999,0.0,0.1"
+    (recording,) = read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
+    assert np.isnan(recording.depth[7])
+    assert recording.counts["refused.range.depth"] == 1
+
+
+def test_a_column_in_another_unit_is_refused(tmp_path: Path) -> None:
+    lines = [f"{0.1 * k:.1f},10.0,{k % 20},0.1" for k in range(50)]
+    with pytest.raises(
+        RecordingError, match=r"pitch must be within 3\.142 .*got up to 19 from 'pitch_rad'.*\[csv\.pitch\]"
+    ):
+        read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
+
+
+def test_a_column_that_is_there_twice_is_refused(tmp_path: Path) -> None:
+    lines = [line + ",0.0" for line in rows(20)]
+    with pytest.raises(RecordingError, match="'depth_m' is in the file 2 times"):
+        read_csv_recording(write(tmp_path / "a.csv", lines, f"{HEADER},depth_m"), CsvMap())
+
+
+def test_another_encoding_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes("# \u00dcbung\n".encode("latin-1") + "\n".join([HEADER, *rows(20)]).encode())
+    with pytest.raises(RecordingError, match=r"is not UTF-8 text \(byte 2\)"):
+        read_csv_recording(path, CsvMap())
+
+
+def test_a_scale_of_nothing_is_refused() -> None:
+    with pytest.raises(ValueError, match="scale must not be 0"):
+        CsvColumn(column="x", unit="m", scale=0.0)
