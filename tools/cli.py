@@ -19,6 +19,7 @@ COMMANDS = {
     "identify": "identify a vehicle from its recordings (bench)",
     "simulate": "free run of a model on the rudder of a recording",
     "predict": "score a model's free run against a recording",
+    "paper": "reproduce the paper's tables and figures, with its errata",
     "doctor": "say what link, device, dependency or compiler is missing and how to get it",
 }
 
