@@ -59,10 +59,11 @@ class CanLog:
                 f"{self.path} has no time stamps ({self.counts['refused.no_time']} frames):"
                 " record with candump -L, or candump -ta"
             )
-        refused = (
-            ", ".join(f"{cause} {count}" for cause, count in self.counts.items()) or "nothing else either"
+        refused = "".join(f", {cause} {count}" for cause, count in self.counts.items())
+        raise LogFormatError(
+            f"{self.path} holds no CAN frame{refused}: is it what its suffix says, "
+            "a recording of candump (.log, .txt), .asc or .blf?"
         )
-        raise LogFormatError(f"{self.path} holds no CAN frame ({refused})")
 
 
 def write_can_log(path: Path, packets: Iterable[Packet]) -> None:

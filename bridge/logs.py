@@ -63,7 +63,8 @@ def read_log(path: str | Path, mavlink: MavlinkMap, can: CanMap) -> LogReading:
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise LogFormatError(
-            f"{path.name}: unknown kind of log {path.suffix!r}; known are {', '.join(READERS)}"
+            f"{path.name}: unknown kind of log {path.suffix!r}; known are {', '.join(READERS)}; "
+            "`mils identify` and `mils replay` also take .csv and .jsonl"
         )
     try:
         if path.stat().st_size == 0:

@@ -112,7 +112,7 @@ def _in_si(path: Path, quantity: str, column: CsvColumn, raw: Array, counts: Cou
     beyond = np.abs(values) > limit
     if beyond.sum() > _MANY * np.isfinite(values).sum():
         raise RecordingError(
-            f"{path}: {quantity} must be within {limit:.4g} in SI units (got up to {np.nanmax(abs(values)):.4g} "
+            f"{path}: {quantity} must be within {limit:.4g} in SI units (got {np.nanmax(abs(values)):.4g} "
             f"from {column.column!r} in {column.unit!r}); set unit and scale under [csv.{quantity}]"
         )
     counts[f"refused.range.{quantity}"] = int(beyond.sum())

@@ -172,7 +172,10 @@ def _create(place: Path, stem: str) -> tuple[Path, int]:
             except FileExistsError:
                 continue
     except OSError as error:
-        raise HostError(f"{place}: journal cannot be created ({error.strerror})") from error
+        raise HostError(
+            f"{place}: journal cannot be created ({error.strerror}); "
+            f"name a folder, or a new file ending in {SUFFIX}"
+        ) from error
     raise AssertionError("count() does not end")
 
 

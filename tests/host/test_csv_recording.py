@@ -129,7 +129,7 @@ def test_single_values_that_no_vehicle_has_are_not_measured(tmp_path: Path) -> N
 def test_a_column_in_another_unit_is_refused(tmp_path: Path) -> None:
     lines = [f"{0.1 * k:.1f},10.0,{k % 20},0.1" for k in range(50)]
     with pytest.raises(
-        RecordingError, match=r"pitch must be within 3\.142 .*got up to 19 from 'pitch_rad'.*\[csv\.pitch\]"
+        RecordingError, match=r"pitch must be within 3\.142 .*got 19 from 'pitch_rad'.*\[csv\.pitch\]"
     ):
         read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
 
