@@ -10,12 +10,11 @@ import numpy as np
 from host.equations import NAMES
 from host.identify_car import car_least_squares, run_estimator
 from host.maximum_likelihood import Fit, fit_maximum_likelihood
-from host.model import VehicleModel
+from host.model import VehicleModel, model_of
 from host.predict import Prediction, predict
 from host.recording import Array, Recording
 from host.uncertainty import covariance, undetermined
 from host.vehicle import Vehicle
-from host.version import program_version
 from host.whiteness import is_white
 
 Method = Literal["car", "mils", "ml"]
@@ -81,51 +80,15 @@ def _learn(
         fit = fit_maximum_likelihood(recordings, on_progress=on_progress)
         std = np.sqrt(np.diag(covariance(fit)))
         values = dict(zip(NAMES, fit.parameters.tolist(), strict=True))
-        model = _model(recordings, vehicle, method, values, dict(zip(NAMES, std.tolist(), strict=True)))
-        model.noise.update(_noise(fit.noise))
+        deviations = dict(zip(NAMES, std.tolist(), strict=True))
+        model = model_of(recordings, vehicle.name, method, values, deviations, fit.noise)
         return model, fit, None
     on_progress("regression on CAR rows")
     if method == "car":
         values, stds = car_least_squares(recordings, vehicle)
-        return _model(recordings, vehicle, method, values, stds), None, None
+        return model_of(recordings, vehicle.name, method, values, stds), None, None
     values, stds, history = run_estimator(recordings, vehicle)
-    return _model(recordings, vehicle, method, values, stds), None, history
-
-
-def _noise(noise: Array) -> dict[str, float]:
-    named = {"pitch_rad": float(np.sqrt(noise[0])), "depth_m": float(np.sqrt(noise[1]))}
-    if noise[2:].any():
-        named |= {"heave_force_density": float(noise[2]), "pitch_moment_density": float(noise[3])}
-    return named
-
-
-def _model(
-    recordings: list[Recording],
-    vehicle: Vehicle,
-    method: Method,
-    values: dict[str, float],
-    std: dict[str, float],
-) -> VehicleModel:
-    files = {recording.name: recording.sha256 for recording in recordings}
-    channels = dict(pitch_rad="pitch", rudder_rad="rudder", depth_m="depth", speed_mps="speed")
-    valid_range = {}
-    for key, name in channels.items():
-        seen = np.concatenate([getattr(recording, name) for recording in recordings])
-        if np.isfinite(seen).any():
-            valid_range[key] = (float(np.nanmin(seen)), float(np.nanmax(seen)))
-    return VehicleModel(
-        vehicle=vehicle.name,
-        step=recordings[0].step,
-        values=values,
-        std=std,
-        noise={},
-        valid_range=valid_range,
-        provenance={
-            "method": method,
-            "version": program_version(),
-            "recordings": [{"name": name, "sha256": digest} for name, digest in files.items()],
-        },
-    )
+    return model_of(recordings, vehicle.name, method, values, stds), None, history
 
 
 def _held_out(recordings: list[Recording], vehicle: Vehicle, method: Method) -> list[Prediction] | None:

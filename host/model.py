@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from host.equations import NAMES, PARAMETERS
+from host.catalogue import BY_NAME, structure_of
+from host.equations import NAMES, PARAMETERS, Structure
 from host.errors import RecordingError
-from host.recording import Array
+from host.recording import Array, Recording
+from host.version import program_version
 
 SCHEMA = 1
 UNITS = {parameter.name: parameter.unit for parameter in PARAMETERS}
@@ -41,9 +43,55 @@ class VehicleModel:
         return UNITS
 
     @property
+    def structure(self) -> Structure:
+        """The base equations with this model's effects."""
+        return structure_of(tuple(str(effect["name"]) for effect in self.effects))
+
+    @property
     def parameters(self) -> Array:
-        """Values in the order of host.equations.NAMES."""
-        return np.array([self.values[name] for name in NAMES])
+        """Values of base and effects, in the order of the structure's parameters."""
+        known = dict(self.values)
+        for effect in self.effects:
+            known |= {name: entry["value"] for name, entry in effect["parameters"].items()}
+        return np.array([known[name] for name in self.structure.names])
+
+
+def model_of(
+    recordings: list[Recording],
+    vehicle: str,
+    method: str,
+    values: dict[str, float],
+    std: dict[str, float],
+    noise: Array | None = None,
+    effects: list[dict[str, Any]] | None = None,
+) -> VehicleModel:
+    """A model learnt from these recordings; `noise` as in host.maximum_likelihood.Fit."""
+    named: dict[str, float] = {}
+    if noise is not None:
+        named = {"pitch_rad": float(np.sqrt(noise[0])), "depth_m": float(np.sqrt(noise[1]))}
+        if noise[2:].any():
+            named |= {"heave_force_density": float(noise[2]), "pitch_moment_density": float(noise[3])}
+    valid_range = {}
+    channels = dict(pitch_rad="pitch", rudder_rad="rudder", depth_m="depth", speed_mps="speed")
+    for key, name in channels.items():
+        seen = np.concatenate([getattr(recording, name) for recording in recordings])
+        if np.isfinite(seen).any():
+            valid_range[key] = (float(np.nanmin(seen)), float(np.nanmax(seen)))
+    files = {recording.name: recording.sha256 for recording in recordings}
+    return VehicleModel(
+        vehicle=vehicle,
+        step=recordings[0].step,
+        values=values,
+        std=std,
+        noise=named,
+        valid_range=valid_range,
+        provenance={
+            "method": method,
+            "version": program_version(),
+            "recordings": [{"name": name, "sha256": digest} for name, digest in files.items()],
+        },
+        effects=effects if effects is not None else [],
+    )
 
 
 def write_model(model: VehicleModel, path: Path) -> None:
@@ -64,6 +112,19 @@ def write_model(model: VehicleModel, path: Path) -> None:
     path.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
+def _check_effect(effect: Any, path: Path) -> None:
+    name = effect.get("name") if isinstance(effect, dict) else effect
+    if name not in BY_NAME:
+        raise RecordingError(f"{path}: holds an effect this version does not know ({name})")
+    for parameter in BY_NAME[name].parameters:
+        entry = effect.get("parameters", {}).get(parameter.name)
+        value = entry.get("value") if isinstance(entry, dict) else None
+        if not isinstance(value, int | float) or not np.isfinite(value):
+            raise RecordingError(
+                f"{path}: effects.{name}.{parameter.name}.value must be a finite number (got {value!r})"
+            )
+
+
 def _json(value: float) -> float | None:
     """JSON has no NaN: a value that could not be found is null."""
     return value if np.isfinite(value) else None
@@ -81,9 +142,9 @@ def read_model(path: Path) -> VehicleModel:
     if not isinstance(document, dict) or document.get("schema") != SCHEMA:
         found = document.get("schema") if isinstance(document, dict) else None
         raise RecordingError(f"{path}: schema must be {SCHEMA} (got {found!r}); identify the vehicle again")
-    if document.get("effects"):
-        names = ", ".join(str(effect.get("name")) for effect in document["effects"])
-        raise RecordingError(f"{path}: holds effects this version cannot simulate ({names})")
+    effects = document.get("effects") or []
+    for effect in effects:
+        _check_effect(effect, path)
     values, std = {}, {}
     for name in NAMES:
         entry = document.get("parameters", {}).get(name)
@@ -109,6 +170,7 @@ def read_model(path: Path) -> VehicleModel:
                 for name, (low, high) in document.get("valid_range", {}).items()
             },
             provenance=dict(document.get("provenance", {})),
+            effects=effects,
         )
     except (KeyError, TypeError, ValueError) as error:
         raise RecordingError(f"{path}: is not a complete model file ({error})") from error

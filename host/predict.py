@@ -44,7 +44,7 @@ class Prediction:
 
 def predict(model: VehicleModel, recording: Recording) -> Prediction:
     """Runs the model freely on the recording's rudder; only the first 5 s fix the initial state."""
-    inputs = inputs_of(recording)
+    inputs = inputs_of(recording, model.structure)
     opening = recording.between(recording.time[0], recording.time[0] + SETTLING_SPAN)
     if opening.time.size < 4:
         opening = recording.between(recording.time[0], recording.time[min(4, recording.time.size - 1)])

@@ -29,7 +29,7 @@ def simulate(model: VehicleModel, recording: Recording) -> Simulation:
 
     It starts where the first 5 s of depth and pitch say; at rest at depth 0 where these are not recorded.
     """
-    inputs = inputs_of(recording)
+    inputs = inputs_of(recording, model.structure)
     opening = recording.between(recording.time[0], recording.time[0] + SETTLING_SPAN)
     if np.isfinite(opening.depth).any() and np.isfinite(opening.pitch).any():
         initial = estimate_initial_state(model.parameters, opening, inputs)

@@ -17,6 +17,7 @@ COMMANDS = {
     "sitl": "a simulated AUV that speaks MAVLink or CAN",
     "replay": "play a log as live frames",
     "identify": "identify a vehicle from its recordings (bench)",
+    "diagnose": "say where simulation and recording differ, what physics was left out, and prove it",
     "simulate": "free run of a model on the rudder of a recording",
     "predict": "score a model's free run against a recording",
     "paper": "reproduce the paper's tables and figures, with its errata",

@@ -48,6 +48,15 @@ def _regressed(target: Array, columns: Columns) -> dict[str, float]:
 
 
 def _smoothed(recording: Recording, speed: float) -> Columns:
+    """The smoothed motion without its ends, where smoothing lacks one side."""
+    motion = smoothed_motion(recording, speed)
+    margin = int(4 * max(1.0, SMOOTHING / recording.step))
+    inside = slice(margin, max(margin + 1, recording.time.size - margin))
+    return {name: values[inside] for name, values in motion.items()}
+
+
+def smoothed_motion(recording: Recording, speed: float) -> Columns:
+    """w, w', theta, q, q', zeta and delta at every row, SI, from the measurements alone."""
     width = max(1.0, SMOOTHING / recording.step)
     h = recording.step
 
@@ -59,16 +68,15 @@ def _smoothed(recording: Recording, speed: float) -> Columns:
         return np.asarray(gaussian_filter1d(values, width, order=order, mode="nearest")) / h**order
 
     theta, depth = filled(recording.pitch), filled(recording.depth)
-    depth = depth - depth.mean()  # the kernel of a derivative sums to zero only nearly
+    datum = depth.mean()  # the kernel of a derivative sums to zero only nearly
+    depth = depth - datum
     u = recording.speed if recording.has_speed else np.full(theta.size, speed)
-    w = derived(depth, 1) + u * np.sin(derived(theta, 0))
-    margin = int(4 * width)
-    inside = slice(margin, max(margin + 1, theta.size - margin))
     return {
-        "w": w[inside],
-        "dw": (derived(depth, 2) + u * derived(theta, 1))[inside],
-        "theta": derived(theta, 0)[inside],
-        "q": derived(theta, 1)[inside],
-        "dq": derived(theta, 2)[inside],
-        "delta": derived(recording.rudder, 0)[inside],
+        "w": derived(depth, 1) + u * np.sin(derived(theta, 0)),
+        "dw": derived(depth, 2) + u * derived(theta, 1),
+        "theta": derived(theta, 0),
+        "q": derived(theta, 1),
+        "dq": derived(theta, 2),
+        "zeta": derived(depth, 0) + datum,
+        "delta": derived(recording.rudder, 0),
     }

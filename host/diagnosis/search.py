@@ -47,10 +47,16 @@ class Explanation:
 class Search:
     """Explanations of some recordings, each set fitted once."""
 
-    def __init__(self, recordings: list[Recording], on_progress: Progress = lambda _: None) -> None:
+    def __init__(
+        self,
+        recordings: list[Recording],
+        on_progress: Progress = lambda _: None,
+        known: Explanation | None = None,
+    ) -> None:
+        """`known`: an explanation of other stretches of the same vehicle, for fits to start from."""
         self.recordings = recordings
         self.on_progress = on_progress
-        self._known: dict[Names, Explanation] = {}
+        self.tried: dict[Names, Explanation] = {}
         held = dict(HELD)
         if recordings[0].has_speed:
             held["u0"] = float(np.mean([r.speed.mean() for r in recordings]))
@@ -58,7 +64,7 @@ class Search:
             held |= {"speed_time": 1.0, "c_ud": 0.0}
         self._held = held
         self._floor = noise_floor(recordings)
-        self._accelerations = accelerations(recordings)
+        self.accelerations = accelerations(recordings)
         self._scale = {
             "": 1.0,
             "speed": 1.0,
@@ -67,6 +73,9 @@ class Search:
             "depth": float(np.nanmean(np.concatenate([r.depth for r in recordings]))),
         }
         self._inputs: dict[Names, list[Inputs]] = {}
+        if known is not None:
+            self._scale["speed"] = float(known.fit.parameters[NAMES.index("u0")])
+            return
         on_progress("base model")
         base = {name: value for name, value in held.items() if name in NAMES}
         fit = fit_maximum_likelihood(recordings, held=base, noise_model="output_error")
@@ -88,13 +97,13 @@ class Search:
             beam = sorted(grown.values(), key=lambda e: e.bic)[:BEAM]
             if not beam or beam[0].bic > best_before - NAMING_MARGIN:
                 break
-        return sorted(self._known.values(), key=lambda e: e.bic)
+        return sorted(self.tried.values(), key=lambda e: e.bic)
 
     def simplest(self) -> Explanation:
         """The best explanation all of whose members pay for themselves."""
-        for explanation in sorted(self._known.values(), key=lambda e: e.bic)[:BEAM]:
+        for explanation in sorted(self.tried.values(), key=lambda e: e.bic)[:BEAM]:
             self.polished(explanation)
-        best = min(self._known.values(), key=lambda e: e.bic)
+        best = min(self.tried.values(), key=lambda e: e.bic)
         pruned = True
         while pruned and best.names:
             pruned = False
@@ -108,8 +117,8 @@ class Search:
     def extended(self, parent: Explanation, effect: Effect) -> Explanation:
         """The parent's set with one effect more, from the effect's best probes."""
         names = parent.names | {effect.name}
-        if names in self._known:
-            return self._known[names]
+        if names in self.tried:
+            return self.tried[names]
         ranked = sorted(self._probed(parent, effect), key=lambda probed: -probed[0])
         starts = [self._start(names, parent, effect.name, probe) for _, probe in ranked[:2]]
         initial, noise = parent.fit.initial, parent.fit.noise
@@ -185,7 +194,7 @@ class Search:
         noise = np.array([*self._floor, 0.0, 0.0])
         point = Point(structure, values, parent.fit.initial, noise)
         free = np.array([name not in self._held for name in structure.names])
-        return annealed(point, inputs, free, self._accelerations)
+        return annealed(point, inputs, free, self.accelerations)
 
     def _start(
         self, names: Names, parent: Explanation, added: str | None = None, probe: Array | None = None
@@ -206,6 +215,23 @@ class Search:
         on = Point(structure, best.parameters, best.initial, best.noise)
         return best if best.converged else output_error(on, inputs, free, MOST_ITERATIONS, TOLERANCE)
 
+    def refitted(self, explanation: Explanation) -> Explanation:
+        """A set fitted to other stretches, fitted to these."""
+        structure, values = structure_of(explanation.names), explanation.fit.parameters.copy()
+        for name, value in self._held.items():
+            if name in structure.names:
+                values[structure.names.index(name)] = value
+        initial = [
+            np.array([0.0, 0.0, _first(recording.pitch), _first(recording.depth)])
+            for recording in self.recordings
+        ]
+        noise = np.array([*self._floor, 0.0, 0.0])
+        start = Point(structure, values, initial, noise)
+        free = np.array([name not in self._held for name in structure.names])
+        inputs = self._inputs_for(explanation.names)
+        starts = [start, annealed(start, inputs, free, self.accelerations)]
+        return self.polished(self._remember(explanation.names, self._fit(explanation.names, starts)))
+
     def polished(self, explanation: Explanation) -> Explanation:
         """The same set, its fit carried on until nothing more is gained."""
         fit = explanation.fit
@@ -222,6 +248,10 @@ class Search:
 
     def _remember(self, names: Names, fit: Fit) -> Explanation:
         bic = -2.0 * fit.log_likelihood + self.free_parameters(names) * log(fit.samples)
-        if names not in self._known or bic < self._known[names].bic:
-            self._known[names] = Explanation(names, fit, bic)
-        return self._known[names]
+        if names not in self.tried or bic < self.tried[names].bic:
+            self.tried[names] = Explanation(names, fit, bic)
+        return self.tried[names]
+
+
+def _first(values: Array) -> float:
+    return float(values[np.isfinite(values)][0])

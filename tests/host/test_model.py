@@ -51,7 +51,8 @@ def test_offsets_may_be_left_out(tmp_path: Path) -> None:
         (lambda d: d["parameters"]["b1"].update(value="x"), "parameters.b1.value must be a number"),
         (lambda d: d["parameters"]["b1"].update(value=None), "parameters.b1.value must be a number"),
         (lambda d: d.pop("step_s"), "is not a complete model file"),
-        (lambda d: d.update(effects=[{"name": "warp"}]), "effects this version cannot simulate (warp)"),
+        (lambda d: d.update(effects=[{"name": "warp"}]), "an effect this version does not know (warp)"),
+        (lambda d: d.update(effects=[{"name": "munk_moment"}]), "effects.munk_moment.c_qw.value must be"),
     ],
 )
 def test_incomplete_model_says_what_is_wrong(tmp_path: Path, change, message: str) -> None:  # type: ignore[no-untyped-def]

@@ -1,0 +1,59 @@
+"""How well a fitted set of effects meets stretches it did not learn from."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.diagnosis.search import Explanation
+from host.predict import SETTLING_SPAN, estimate_initial_state
+from host.propagate import free_run, inputs_of
+from host.recording import Array, Recording
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Misfit:
+    """Errors of free runs after their first 5 s; chi2 is the mean square over the sensors' noise variance."""
+
+    depth_rmse_m: float
+    pitch_rmse_rad: float
+    chi2_depth: float
+    chi2_pitch: float
+
+    def as_json(self) -> dict[str, float]:
+        return {
+            "depth_rmse_m": self.depth_rmse_m,
+            "pitch_rmse_rad": self.pitch_rmse_rad,
+            "chi2_depth": self.chi2_depth,
+            "chi2_pitch": self.chi2_pitch,
+        }
+
+    @property
+    def chi2(self) -> float:
+        """Both channels together."""
+        return 0.5 * (self.chi2_depth + self.chi2_pitch)
+
+
+def free_run_errors(explanation: Explanation, recording: Recording) -> Array:
+    """Measured minus free run, pitch and depth (2, N); NaN where not measured and in the first 5 s."""
+    fit = explanation.fit
+    inputs = inputs_of(recording, fit.structure)
+    opening = recording.between(recording.time[0], recording.time[0] + SETTLING_SPAN)
+    initial = estimate_initial_state(fit.parameters, opening, inputs)
+    with np.errstate(over="ignore", invalid="ignore"):
+        run = free_run(fit.parameters, initial, inputs)
+    errors = np.vstack([recording.pitch, recording.depth]) - run.outputs
+    errors[:, recording.time < recording.time[0] + SETTLING_SPAN] = np.nan
+    return errors
+
+
+def misfit(explanation: Explanation, recordings: list[Recording], floor: Array) -> Misfit:
+    """Scores an explanation on recordings against the noise floor (2,) of pitch and depth."""
+    errors = np.hstack([free_run_errors(explanation, recording) for recording in recordings])
+    with np.errstate(over="ignore", invalid="ignore"):
+        pitch, depth = np.nan_to_num(np.nanmean(errors**2, axis=1), nan=1e12, posinf=1e12)
+    return Misfit(
+        depth_rmse_m=float(np.sqrt(depth)),
+        pitch_rmse_rad=float(np.sqrt(pitch)),
+        chi2_depth=float(depth / floor[1]),
+        chi2_pitch=float(pitch / floor[0]),
+    )

@@ -1,0 +1,47 @@
+"""`mils diagnose`: where simulation and recording differ, what physics was left out, and proof."""
+
+import argparse
+from pathlib import Path
+
+from tools.bench import load_vehicle, progress, read_all
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "recordings", metavar="RECORDING", nargs="+", type=Path, help=".csv .tlog .BIN .log .asc .blf .jsonl"
+    )
+    parser.add_argument("--vehicle", type=Path, help="vehicle file: columns, units, channels, speed")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("."),
+        metavar="DIR",
+        help="where diagnosis.json, extended_model.json and report.html go",
+    )
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0 when the answer is known (nothing missing, or explained); 1 when it is not, or only in part."""
+    vehicle = load_vehicle(args.vehicle)
+    with progress(args.quiet) as say:
+        recordings = read_all(args.recordings, vehicle, say)
+        from host.diagnosis.diagnose import diagnose
+        from host.diagnosis.files import write_diagnosis, write_extended_model
+        from host.diagnosis.report import summary, title, write_report
+
+        found = diagnose(recordings, say)
+        args.out.mkdir(parents=True, exist_ok=True)
+        write_diagnosis(found, args.out / "diagnosis.json")
+        write_extended_model(found, vehicle, args.out / "extended_model.json")
+        say("writing the report")
+        write_report(found, vehicle.name, args.out / "report.html")
+    print(f"{found.verdict}: {summary(found)}")
+    for effect in found.effects:
+        twins = f"  (or {', '.join(map(title, effect.twins))})" if effect.twins else ""
+        print(f"  {effect.name}{twins}")
+        for name, (value, std, unit) in effect.coefficients.items():
+            print(f"    {name:20s} {value:+.5g} +- {std:.2g} {unit}")
+    print(f"  {found.remaining}")
+    print(f"report: {args.out / 'report.html'}")
+    return 0 if found.verdict in ("no_mismatch", "explained") else 1
