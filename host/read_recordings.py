@@ -1,18 +1,16 @@
 """Any recording to its stretches on the time grid: text, telemetry, dataflash, CAN logs, the journal."""
 
 from collections import Counter
-from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
-from bridge.logs import read_log
-from bridge.measurement import Measurement
+from bridge.logs import LogReading, read_log
 from firmware_model.sample import Sample
 from host.align import Aligner
 from host.csv_recording import read_csv_recording
 from host.errors import RecordingError
-from host.journal import read_journal
+from host.journal import JournalReading, read_journal
 from host.recording import NEEDED, Recording, file_sha256, split_at_gaps
 from host.vehicle import Vehicle
 
@@ -34,31 +32,25 @@ def read_recordings(path: Path, vehicle: Vehicle, needs: tuple[str, ...] = NEEDE
     if suffix == ".csv":
         return read_csv_recording(path, vehicle.csv, needs)
     if suffix == ".jsonl":
-        journal = read_journal(path)
-        return _aligned(path, journal.measurements, journal.counts, vehicle, needs)
-    log = read_log(path, vehicle.mavlink, vehicle.can)
-    return _aligned(path, log.measurements, log.counts, vehicle, needs)
+        return _aligned(path, read_journal(path), vehicle, needs)
+    return _aligned(path, read_log(path, vehicle.mavlink, vehicle.can), vehicle, needs)
 
 
 def _aligned(
-    path: Path,
-    measurements: Iterable[Measurement],
-    counts: Counter[str],
-    vehicle: Vehicle,
-    needs: tuple[str, ...],
+    path: Path, reading: LogReading | JournalReading, vehicle: Vehicle, needs: tuple[str, ...]
 ) -> list[Recording]:
     aligner = Aligner(vehicle.alignment)
     segments: dict[int, list[Sample]] = {}
     seen: Counter[str] = Counter()
-    for measurement in measurements:
+    for measurement in reading.measurements:
         seen[measurement.quantity.value] += 1
         segment = aligner.segment  # a push that starts a new segment returns the end of the old one
         segments.setdefault(segment, []).extend(aligner.push(measurement))
     segments.setdefault(aligner.segment, []).extend(aligner.flush())
-    digest, total = file_sha256(path), counts + aligner.counts
+    digest, total = file_sha256(path), reading.counts + aligner.counts
     pieces = []
     for samples in filter(None, segments.values()):
-        whole = _recording(path.name, digest, samples, vehicle.alignment.step, total)
+        whole = _recording(path.name, digest, samples, vehicle.alignment.step, total, tuple(reading.notes))
         pieces += split_at_gaps(whole, max(1.0, 2.5 * whole.step), needs)
     if not pieces:
         lacking = [name for name in needs if not seen[name]]
@@ -70,7 +62,9 @@ def _aligned(
     return pieces
 
 
-def _recording(name: str, sha256: str, samples: list[Sample], step: float, counts: Counter[str]) -> Recording:
+def _recording(
+    name: str, sha256: str, samples: list[Sample], step: float, counts: Counter[str], notes: tuple[str, ...]
+) -> Recording:
     time = np.array([sample.t_us for sample in samples], dtype=float) * 1e-6
     return Recording(
         name=name,
@@ -83,4 +77,5 @@ def _recording(name: str, sha256: str, samples: list[Sample], step: float, count
         pitch_rate=np.array([sample.pitch_rate for sample in samples]),
         step=step,
         counts=counts,
+        notes=notes,
     )

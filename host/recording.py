@@ -23,6 +23,8 @@ class Recording:
     speed       m/s through the water; all NaN where the vehicle has no speed sensor
     pitch_rate  rad/s; all NaN where it is not recorded
     step        s, nominal interval
+    counts      what was refused in the whole file, by cause
+    notes       what was lost or decided on the user's behalf while the file was read, one sentence each
     """
 
     name: str
@@ -35,6 +37,7 @@ class Recording:
     pitch_rate: Array
     step: float
     counts: Counter[str] = field(default_factory=Counter)
+    notes: tuple[str, ...] = ()
 
     @property
     def has_speed(self) -> bool:

@@ -38,12 +38,15 @@ def test_an_independent_simulator_is_identified_and_physics_left_out_is_admitted
 
 
 @pytest.mark.parametrize("name", ["dive.tlog", "dive.BIN"])
-def test_a_thruster_pitched_dive_is_identified_from_its_logs(tmp_path: Path, name: str) -> None:
+def test_a_thruster_pitched_dive_is_identified_from_its_logs(
+    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     vehicle = str(EXAMPLES / "ardusub_6dof.toml")
     code, parameters = identify(tmp_path, DATA / "ardusub" / name, "--vehicle", vehicle)
     assert code in (0, 1)
     assert parameters["b2"]["value"] < 0.0
     assert (tmp_path / "report.html").stat().st_size > 50_000
+    assert name.endswith(".BIN") or f"note: {name}: locked to system 1" in capsys.readouterr().out
 
 
 def test_a_bus_with_rudder_and_attitude_but_no_depth_says_so(

@@ -1,0 +1,51 @@
+"""Recordings of any kind on the grid; what reading them decided or lost comes along."""
+
+from pathlib import Path
+
+import pytest
+
+from bridge.measurement import Measurement, Quantity
+from host.errors import RecordingError
+from host.journal import Journal
+from host.read_recordings import read_recordings
+from host.vehicle import default_vehicle
+
+
+def journal(folder: Path, boots: int = 1) -> Path:
+    """Ten seconds of everything at 10 Hz for each boot."""
+    writer = Journal(folder / "dive.jsonl", vehicle="v", configuration={}, wall_s=lambda: 1.7e9, warn=print)
+    for boot in range(boots):
+        for k in range(100):
+            t_us = 20_000_000 * boot + 100_000 * k
+            writer.measurements(
+                Measurement(quantity=quantity, value=0.01 * k, t_us=t_us, source="x", boot=boot)
+                for quantity in (Quantity.DEPTH, Quantity.PITCH, Quantity.RUDDER)
+            )
+    writer.close()
+    return writer.path
+
+
+def test_a_killed_journal_is_read_to_its_last_line_and_says_so(tmp_path: Path) -> None:
+    path = journal(tmp_path)
+    path.write_bytes(path.read_bytes()[:-5])
+    (recording,) = read_recordings(path, default_vehicle())
+    assert recording.time.size >= 99
+    assert recording.notes == ("the last line is cut: the program was stopped while writing it",)
+    assert recording.counts["damaged"] == 1
+
+
+def test_a_restart_of_the_vehicle_cuts_in_two(tmp_path: Path) -> None:
+    pieces = read_recordings(journal(tmp_path, boots=2), default_vehicle())
+    assert [piece.time.size for piece in pieces] == [100, 100]
+    assert {piece.notes for piece in pieces} == {()}
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [("none.csv", "no such file"), (".", "is a folder"), ("empty.jsonl", "is empty")],
+)
+def test_what_cannot_be_read_is_one_line(tmp_path: Path, name: str, says: str) -> None:
+    (tmp_path / "empty.jsonl").touch()
+    with pytest.raises(RecordingError, match=says) as caught:
+        read_recordings(tmp_path / name, default_vehicle())
+    assert "\n" not in str(caught.value)
