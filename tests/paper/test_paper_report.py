@@ -31,7 +31,7 @@ def folder(tmp_path_factory):
         yield lambda: None
 
     folder = tmp_path_factory.mktemp("paper")
-    write_report(Effort(amplitudes=3, seeds=2, shares=(0.0,), records=1), folder, stage)
+    write_report(Effort(amplitudes=3, seeds=2, trial=50.0, shares=(0.0,), records=1), folder, stage)
     return folder
 
 

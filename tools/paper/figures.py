@@ -256,7 +256,7 @@ def missing_figure(found: Study) -> str:
                     )
             axis.set_ylim(1e-4, 2e3)
             if row == 0:
-                axis.set_title(data.replace(", ", ",\n", 1), fontsize=9)
+                axis.set_title(data, fontsize=9)
             else:
                 axis.set_xlabel("missing, %")
             if d == 0:

@@ -22,11 +22,9 @@ from tools.sitl.excitation import Excitation
 from tools.sitl.recording import sail
 from tools.sitl.scenario import Scenario
 
-DATA = (
-    "the paper's difference equations, no noise",
-    "continuous vehicle, no noise",
-    "continuous vehicle, 0.1° and 1 cm",
-)
+DATA = ("paper's own, no noise", "vehicle, no noise", "vehicle, 0.1° and 1 cm")
+"""From the paper's difference equations; from the continuous vehicle of Table 1, without and with noise."""
+
 PATTERNS = ("random", "bursts of 2 s")
 DURATION = 120.0  # s
 PITCH_NOISE, DEPTH_NOISE = radians(0.1), 0.01  # rad, m
@@ -191,7 +189,7 @@ def missing_table(found: Study) -> Table:
                 for i in range(len(found.shares)):
                     at = (d, p, i, m)
                     cells.append(
-                        " / ".join(
+                        "/".join(
                             _figure(float(np.median(part[at])))
                             for part in (found.parameters, found.pitch, found.depth)
                         )
@@ -203,10 +201,10 @@ def missing_table(found: Study) -> Table:
         title="Error against the share of samples missing",
         columns=("data", "method", "missing", *(f"{share:.0%}" for share in found.shares)),
         rows=rows,
-        formats=("", LINES, LINES, *[LINES] * len(found.shares)),
+        formats=(LINES, LINES, LINES, *[LINES] * len(found.shares)),
         marked=tuple(marked),
         note=(
-            f"Each cell: parameter error / held-out pitch error / held-out depth error, all in %, median of "
+            f"Each cell: parameter error/held-out pitch error/held-out depth error, all in %, median of "
             f"{seeds} "
             f"record{'s' if seeds > 1 else ''} of {DURATION:g} s at {1 / H:g} Hz, random rudder steps. "
             f"Parameters: a1, a2, a3, b1, b2 "
@@ -225,4 +223,6 @@ def _figure(value: float) -> str:
         return "–"
     if value > WORST:
         return "> 1000"
+    if value < 0.01:
+        return "<0.01"
     return f"{value:.2g}" if value < 10.0 else f"{value:.0f}"

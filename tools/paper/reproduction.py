@@ -115,7 +115,6 @@ def estimates_tables(result: Reproduction) -> list[Table]:
                         _numbers(best.at_times[i]),
                         float(relative_error(best.at_times[i], wrong)),
                         float(relative_error(best.at_times[i], right)),
-                        _numbers(likely.at_times[i]),
                         float(relative_error(likely.at_times[i], wrong)),
                         float(relative_error(likely.at_times[i], right)),
                     )
@@ -138,12 +137,11 @@ def estimates_tables(result: Reproduction) -> list[Table]:
                     "nearest record: estimates",
                     "nearest: e against printed, %",
                     "nearest: e against correct, %",
-                    "13° sine: estimates",
                     "13°: e against printed, %",
                     "13°: e against correct, %",
                 ),
                 rows=rows,
-                formats=("d", LINES, "d", LINES, ".2f", ".2f", LINES, ".2f", ".2f", LINES, ".2f", ".2f"),
+                formats=("d", LINES, "d", LINES, ".2f", ".2f", LINES, ".2f", ".2f", ".2f", ".2f"),
                 marked=tuple(range(last - 1, len(rows), last)),
                 note=(
                     f"Nearest record: {record.kind}, amplitude {record.amplitude:.3g}{extra}. 13° sine: from "
