@@ -1,0 +1,164 @@
+"""How strong a hidden effect must be for a wanted misfit, and whether it stays visible beside another."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from tools.sitl.errors import ScenarioError
+from tools.sitl.recording import measure
+from tools.sitl.scenario import Scenario
+from tools.trial.hidden import Hidden, Setting, with_strength
+from tools.trial.linear import MORE, NAMES, STATE, free_run
+from tools.trial.outing import Outing
+from tools.trial.refit import remaining
+from tools.trial.voyage import Voyage, sail
+
+Array = npt.NDArray[np.float64]
+
+WEAKEST = 1e-5
+NEAR_ENOUGH = 1.3  # factor between the wanted and the reached misfit
+MOST_PITCH = 1.0  # rad; no vehicle of this kind goes further
+LEAST_DEPTH = 1.0  # m, or the hull would leave the water
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Yardstick:
+    """Noise deviations (rad, m) and which samples arrive: what misfits of one recording are measured in."""
+
+    pitch_noise: float
+    depth_noise: float
+    has_pitch: npt.NDArray[np.bool_]
+    has_depth: npt.NDArray[np.bool_]
+
+    def residual(self, pitch: Array, depth: Array, truth: Voyage) -> Array:
+        """Differences to the truth over the noise, where measured; the last axis runs over samples."""
+        return np.concatenate(
+            [
+                (pitch - truth.pitch)[..., self.has_pitch] / self.pitch_noise,
+                (depth - truth.depth)[..., self.has_depth] / self.depth_noise,
+            ],
+            axis=-1,
+        )
+
+
+def yardstick(scenario: Scenario, seed: int, voyage: Voyage) -> Yardstick:
+    """For the instruments of a scenario."""
+    table = measure(scenario, seed, voyage.table)
+    rows = np.round(table["time_s"] * scenario.sensors.depth.rate_hz).astype(int)
+    arrived = np.zeros((2, len(voyage.pitch)), dtype=bool)
+    arrived[0, rows] = np.isfinite(table["pitch_rad"])
+    arrived[1, rows] = np.isfinite(table["depth_m"])
+    deviations = [
+        float(np.hypot(channel.noise, channel.quantum / 12**0.5))
+        for channel in (scenario.sensors.pitch, scenario.sensors.depth)
+    ]
+    return Yardstick(
+        pitch_noise=deviations[0], depth_noise=deviations[1], has_pitch=arrived[0], has_depth=arrived[1]
+    )
+
+
+def is_ordinary(voyage: Voyage) -> bool:
+    """Whether such a run could have been recorded."""
+    deep = voyage.table["depth_m"].min() > LEAST_DEPTH
+    return bool(deep and np.abs(voyage.table["pitch_rad"]).max() < MOST_PITCH)
+
+
+def linear_misfit(
+    voyage: Voyage, outing: Outing, setting: Setting, noise: Yardstick, with_more: bool = False
+) -> float:
+    """What the paper's linear equations cannot follow, with their best coefficients.
+
+    with_more    all linear equations with constant forces: what is foreign must not be mistaken for those
+    """
+    start = outing.scenario.start
+    state = [getattr(start, name) for name in STATE]
+    known = list(setting.vehicle.coefficients.values())
+    first = np.array([*known, *state, *(0.0 for _ in MORE)])
+    steps = np.array([*(1e-4 * abs(value) for value in known), 1e-4, 1e-4, 1e-4, 1e-3, *(1e-4 for _ in MORE)])
+    free = np.array(
+        [name != "u0" or not outing.has_speed for name in NAMES]
+        + [True] * len(STATE)
+        + [with_more] * len(MORE)
+    )
+    speed = voyage.speed if outing.has_speed else None
+
+    def model(sets: Array) -> Array:
+        whole = np.repeat(first[None, :], len(sets), axis=0)
+        whole[:, free] = sets
+        with np.errstate(over="ignore", invalid="ignore"):
+            pitch, depth = free_run(whole, voyage.command, 1.0 / outing.rate_hz, speed)
+            return noise.residual(pitch, depth, voyage)
+
+    return remaining(model, first[free], steps[free])
+
+
+def misfit_beside(
+    voyage: Voyage,
+    outing: Outing,
+    seed: int,
+    others: tuple[Hidden, ...],
+    setting: Setting,
+    noise: Yardstick,
+    least: float,
+) -> float:
+    """What a vehicle of the same kind with only `others` hidden cannot follow, with its best coefficients.
+
+    Gives up below `least`, as such an effect will not be used.
+
+    The coefficients are shares of the hull's derivatives, the speed where it is not measured, the start, and
+    the strength of the others.
+    """
+    hull, start = outing.scenario.hull, outing.scenario.start
+    derivatives = ("Zw", "Mq", "zb", "Zdelta", "Mdelta")
+    speeds = () if outing.has_speed else ("speed",)
+    first = np.array(
+        [1.0] * (len(derivatives) + len(speeds) + len(others)) + [getattr(start, name) for name in STATE]
+    )
+    steps = np.array([1e-3] * (len(first) - 4) + [1e-3] * 4)
+
+    def run(values: Array) -> Array:
+        shares = iter(values.tolist())
+        changed_hull = replace(hull, **{name: getattr(hull, name) * next(shares) for name in derivatives})
+        changed = {name: getattr(start, name) * next(shares) for name in speeds}
+        scaled = tuple(with_strength(other, other.strength * next(shares)) for other in others)
+        changed |= {name: next(shares) for name in STATE}
+        scenario = replace(outing.scenario, hull=changed_hull, start=replace(start, **changed))
+        other_run = sail(scenario, seed, scaled, setting, voyage.command)
+        return noise.residual(other_run.pitch, other_run.depth, voyage)
+
+    def model(sets: Array) -> Array:
+        rows = []
+        for values in sets:
+            try:
+                rows.append(run(values))
+            except (ScenarioError, OverflowError):
+                rows.append(np.full(int(noise.has_pitch.sum() + noise.has_depth.sum()), np.inf))
+        return np.array(rows)
+
+    return remaining(model, first, steps, most_iterations=4, least=least)
+
+
+def strength_for(wanted: float, misfit_at: Callable[[float], float]) -> float | None:
+    """The strength within [WEAKEST, 1] whose misfit is near `wanted`; None where there is none.
+
+    Misfits grow with the square of most effects; where they do not, the bracket is halved in the logarithm.
+    """
+    low, high, strength = WEAKEST, 1.0, 0.05
+    for _ in range(12):
+        misfit = misfit_at(strength)
+        if wanted / NEAR_ENOUGH < misfit < wanted * NEAR_ENOUGH:
+            return strength
+        if misfit < wanted:
+            low = strength
+        else:
+            high = strength
+        if high / low < 1.001:
+            return None
+        guess = strength * (wanted / misfit) ** 0.5 if np.isfinite(misfit) and misfit > 0.0 else 0.0
+        if guess >= high and high == 1.0 and strength < 1.0:
+            strength = 1.0
+        else:
+            strength = guess if low * 1.02 < guess < high / 1.02 else (low * high) ** 0.5
+    return None
