@@ -102,7 +102,10 @@ def test_a_rudder_may_be_a_mix_of_channels(tmp_path: Path) -> None:
         ("[estimator]\nstep = 1", "estimator.step is given by alignment.step; leave it out here"),
         ("[estimator]\nspeed = 1", "estimator.speed is given by speed; leave it out here"),
         ("estimator = 1", "estimator must be a table (got 1)"),
-        ("[estimator.mils]\ninnovation_length = 0", "estimator.mils.innovation_length must be from 1 to 64 (got 0)"),
+        (
+            "[estimator.mils]\ninnovation_length = 0",
+            "estimator.mils.innovation_length must be from 1 to 64 (got 0)",
+        ),
         ("[mavlink]\nrudder = [{ channel = 1 }]", "mavlink.rudder[0].rad_per_us is missing"),
         ("[mavlink]\nrudders = []", "mavlink.rudders is not a known key"),
         ("[csv]\ndepth = { column = 'd', unit = 'fathom' }", "csv.depth.unit must be one of m, cm, mm, ft"),
@@ -137,7 +140,11 @@ def test_name_and_speed_are_checked(tmp_path: Path, first: str, message: str) ->
 def test_the_meaning_of_a_state_changes_with_what_it_rests_on(tmp_path: Path) -> None:
     plain = read(tmp_path, "").meaning
     assert read(tmp_path, "[publish]\nperiod = 2\n[link]\nurl = 'udp:1'").meaning == plain
-    for changed in ("[alignment]\nstep = 0.2", "[estimator]\nvalid_below = 0.05", "[mavlink]\nwater_density = 998"):
+    for changed in (
+        "[alignment]\nstep = 0.2",
+        "[estimator]\nvalid_below = 0.05",
+        "[mavlink]\nwater_density = 998",
+    ):
         assert read(tmp_path, changed).meaning != plain
 
 

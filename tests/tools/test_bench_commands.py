@@ -115,7 +115,7 @@ def test_a_plane_that_never_moved_ends_with_no(tmp_path: Path, capsys: pytest.Ca
         (["predict", "nowhere.json", "nowhere.csv"], "No such file"),
         (["identify", "."], "is a folder"),
         (["identify", "{empty}"], "is empty"),
-        (["identify", "{garbage}"], "is not a text table"),
+        (["identify", "{garbage}"], "is not UTF-8 text"),
         (["identify", "{recording}", "--vehicle", "nowhere.toml"], "nowhere.toml"),
         (["predict", "{recording}", "{recording}"], "is not a model file"),
     ],
