@@ -51,7 +51,7 @@ def _at_command(c: Chain) -> ca.SX:
     return c.command
 
 
-_SHARES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+_SHARES = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)
 
 EFFECTS = (
     Effect(

@@ -49,7 +49,7 @@ EFFECTS = (
         sentence="The water heaves slowly up and down (an internal wave).",
         equation="zeta' = ... + internal_sine sin(2 pi t/T) + internal_cosine cos(2 pi t/T)",
         manoeuvre="a straight level run of several periods with the planes fixed",
-        probes=tuple((1e-3, 1e-3, share) for share in (0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.57, 0.8, 1.2)),
+        probes=tuple((1e-3, 1e-3, share) for share in (0.08, 0.13, 0.2, 0.32, 0.5, 0.9)),
         scales=("", "", "duration"),
         force=_internal_wave,
     ),
@@ -68,7 +68,7 @@ EFFECTS = (
         sentence="Surface waves carry the vehicle up and down, less so the deeper it is.",
         equation="zeta' = ... + exp(-k zeta) (wave_sine sin ot + wave_cosine cos ot), o = 2 pi/T, k = o^2/g",
         manoeuvre="level runs at two depths, the shallower one within a few metres of the surface",
-        probes=tuple((0.01, 0.01, period) for period in (3.0, 4.0, 5.0, 6.0, 7.0, 8.5, 10.0, 12.0, 15.0)),
+        probes=tuple((0.01, 0.01, period) for period in (3.5, 5.0, 6.5, 8.5, 11.0, 15.0)),
         force=_surface_waves,
     ),
 )

@@ -89,7 +89,7 @@ EFFECTS = (
         sentence="The weight changed at one moment: ballast was dropped, or water came in.",
         equation="w' = ... + c_wb (t > ballast_time)",
         manoeuvre="straight level runs before and after",
-        probes=tuple((0.0, share) for share in (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)),
+        probes=tuple((0.0, share) for share in (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)),
         scales=("", "duration"),
         force=_ballast,
     ),

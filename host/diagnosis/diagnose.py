@@ -86,7 +86,7 @@ def diagnose(recordings: list[Recording], on_progress: Callable[[str], None] = l
     effects = [_with_coefficients(effect, values, std) for effect in effects]
     longest = max(recordings, key=lambda recording: recording.duration)
     errors = free_run_errors(base, longest)
-    verdict = _verdict(best, before, after, has_sea)
+    verdict = _verdict(best, floor, before, after, has_sea)
     return Diagnosis(
         verdict=verdict,
         recordings=recordings,
@@ -178,11 +178,11 @@ def _refitted(explanation: Explanation, recordings: list[Recording], has_sea: bo
     return Explanation(again.names, fit, again.bic)
 
 
-def _verdict(best: Explanation, before: Misfit, after: Misfit, has_sea: bool) -> Verdict:
-    at_floor = max(after.chi2_depth, after.chi2_pitch) < NOTHING_LEFT
-    is_clean = at_floor and all(is_white(e) for e in best.fit.whitened)
+def _verdict(best: Explanation, floor: Array, before: Misfit, after: Misfit, has_sea: bool) -> Verdict:
+    taught = best.fit.noise[:2] / floor
+    at_floor = max(taught) < NOTHING_LEFT and max(after.chi2_depth, after.chi2_pitch) < 2.0 * NOTHING_LEFT
     if not best.names:
-        return "no_mismatch" if at_floor or is_clean or has_sea else "unexplained"
+        return "no_mismatch" if at_floor or has_sea else "unexplained"
     if at_floor or (has_sea and after.chi2 < 0.5 * before.chi2):
         return "explained"
     return "partly_explained" if after.chi2 < 0.7 * before.chi2 else "unexplained"

@@ -16,7 +16,7 @@ from host.diagnosis.first_guess import accelerations, first_guess
 from host.diagnosis.noise_floor import noise_floor
 from host.equations import NAMES, Effect
 from host.gauss_newton import GaussNewton, Point
-from host.maximum_likelihood import Fit, annealed, fit_maximum_likelihood, output_error, residuals_at
+from host.maximum_likelihood import RUNAWAY, Fit, annealed, fit_maximum_likelihood, output_error, residuals_at
 from host.propagate import Inputs, inputs_of
 from host.recording import Array, Recording
 
@@ -25,11 +25,18 @@ NAMING_MARGIN = 12.0  # of BIC, beyond which an effect pays; holds false naming 
 BEAM = 4
 PROMISING = 6
 LARGEST_SET = 5
-FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = (
-    4,
-    15,
-    0.3,
-)  # enough to rank sets; those that count are polished
+# Enough to rank sets; those that count are polished.
+FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 3, 12, 0.5
+
+CORE = {
+    "heave_pitch_rate_coupling",
+    "heave_quadratic_drag",
+    "munk_moment",
+    "pitch_quadratic_damping",
+    "large_angle_kinematics",
+    "large_angle_restoring",
+    "actuator_lag",
+}
 
 Names = frozenset[str]
 Progress = Callable[[str], None]
@@ -73,6 +80,7 @@ class Search:
             "depth": float(np.nanmean(np.concatenate([r.depth for r in recordings]))),
         }
         self._inputs: dict[Names, list[Inputs]] = {}
+        self._gains: dict[tuple[Names, str], list[tuple[float, Array]]] = {}
         if known is not None:
             self._scale["speed"] = float(known.fit.parameters[NAMES.index("u0")])
             return
@@ -119,11 +127,10 @@ class Search:
         names = parent.names | {effect.name}
         if names in self.tried:
             return self.tried[names]
-        ranked = sorted(self._probed(parent, effect), key=lambda probed: -probed[0])
-        starts = [self._start(names, parent, effect.name, probe) for _, probe in ranked[:2]]
-        initial, noise = parent.fit.initial, parent.fit.noise
-        points = [Point(structure_of(names), start, initial, noise) for start in starts]
-        return self._remember(names, self._fit(names, [*points, self._guess(names, parent, starts[0])]))
+        _, probe = max(self._probed(parent, effect), key=lambda probed: probed[0])
+        start = self._start(names, parent, effect.name, probe)
+        point = Point(structure_of(names), start, parent.fit.initial, parent.fit.noise)
+        return self._remember(names, self._fit(names, [point, self._guess(names, parent, start)]))
 
     def without(self, explanation: Explanation, name: str) -> Explanation:
         """The same set without one of its effects."""
@@ -154,13 +161,20 @@ class Search:
         )
 
     def _promising(self, parent: Explanation, most: int) -> list[Effect]:
+        """Effects to fit in earnest: those predicted to gain most, and the core of every vehicle.
+
+        The prediction is local. A base bent far from the truth hides what the core effects, which trade
+        against its own coefficients, would gain once all of them are free; so these are always tried.
+        """
         gains = self.gains(parent)
         order = sorted(gains, key=lambda name: -gains[name])
-        worth = [name for name in order if gains[name] > NAMING_MARGIN]
-        return [effect for name in worth[:most] for effect in CATALOGUE if effect.name == name]
+        worth = {name for name in order[:most] if gains[name] > NAMING_MARGIN}
+        return [effect for effect in CATALOGUE if effect.name in gains and effect.name in worth | CORE]
 
     def _probed(self, parent: Explanation, effect: Effect) -> list[tuple[float, Array]]:
         """Predicted gain and values of each probe of an effect: one Gauss-Newton step from there."""
+        if (parent.names, effect.name) in self._gains:
+            return self._gains[parent.names, effect.name]
         names = parent.names | {effect.name}
         structure = structure_of(names)
         inputs = self._inputs_for(names)
@@ -176,9 +190,11 @@ class Search:
             )
             with np.errstate(over="ignore", invalid="ignore"):
                 white = residuals_at(point, inputs)
+                runs_away = not all(np.abs(S).max() < RUNAWAY for _, S in white)
                 cost = sum(float(np.sum(e**2)) for e, _ in white)
-                left = GaussNewton(white, point, free).predicted_cost(cost) if np.isfinite(cost) else np.inf
+            left = np.inf if runs_away else GaussNewton(white, point, free).predicted_cost(cost)
             probed.append((before - left, probe))
+        self._gains[parent.names, effect.name] = probed
         return probed
 
     def _probes(self, effect: Effect) -> list[Array]:
