@@ -32,8 +32,8 @@ class Parameter:
 
 
 PARAMETERS = (
-    Parameter(name="a1", unit="1/s", lower=-50.0, upper=-1e-4, meaning="heave damping"),
-    Parameter(name="a2", unit="1/s", lower=-100.0, upper=-1e-4, meaning="pitch damping"),
+    Parameter(name="a1", unit="1/s", lower=-40.0, upper=-1e-4, meaning="heave damping"),
+    Parameter(name="a2", unit="1/s", lower=-45.0, upper=-1e-4, meaning="pitch damping"),
     Parameter(name="a3", unit="1/s^2", lower=-1000.0, upper=5.0, meaning="pitch restoring"),
     Parameter(name="b1", unit="m/s^2/rad", lower=-100.0, upper=100.0, meaning="plane force in heave"),
     Parameter(name="b2", unit="1/s^2", lower=-1000.0, upper=1000.0, meaning="plane moment in pitch"),
@@ -95,6 +95,7 @@ class Effect:
     state     name of the state the effect brings with it, and `initial`, its value at the first row
     probes    start values of its parameters to try; `scales` fits them to a recording
     lags      whether it looks at earlier commands
+    is_common whether every vehicle has it: always tried, and preferred where the recording cannot decide
     """
 
     name: str
@@ -113,6 +114,7 @@ class Effect:
     state: str | None = None
     initial: Callable[[Chain], ca.SX] | None = None
     lags: bool = False
+    is_common: bool = False
 
 
 @dataclass(frozen=True)

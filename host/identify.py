@@ -21,6 +21,7 @@ Method = Literal["car", "mils", "ml"]
 METHODS: tuple[Method, ...] = ("car", "mils", "ml")
 SHORTEST_TO_SPLIT = 40.0  # s; below it a held-out part would leave too little to learn from
 HELD_OUT_SHARE = 0.3
+UNKNOWN = 1e4  # of a standard deviation in SI: the recording says nothing at all
 
 Progress = Callable[[str], None]
 
@@ -79,6 +80,7 @@ def _learn(
     if method == "ml":
         fit = fit_maximum_likelihood(recordings, on_progress=on_progress)
         std = np.sqrt(np.diag(covariance(fit)))
+        std[std > UNKNOWN] = np.inf
         values = dict(zip(NAMES, fit.parameters.tolist(), strict=True))
         deviations = dict(zip(NAMES, std.tolist(), strict=True))
         model = model_of(recordings, vehicle.name, method, values, deviations, fit.noise)

@@ -12,6 +12,7 @@ from host.plots import free_run_plot, history_plot, overview_plot, whiteness_plo
 from host.predict import Prediction
 from host.uncertainty import MANOEUVRE
 
+TRUSTED_FIT = 80.0  # %, of a free run: below it the values are a description, not a law
 MOST_PLOTS = 4  # a folder of short dives would drown the reader
 
 
@@ -28,6 +29,7 @@ def write_report(result: Identification, path: Path) -> None:
         duration=sum(recording.duration for recording in result.recordings),
         undetermined=result.undetermined,
         verdict=verdict(result),
+        trusted=not verdict(result).startswith("The linear model does not"),
         notes=result.notes,
         parameters=_parameters(result),
         advice=advice(result),
@@ -55,6 +57,12 @@ def verdict(result: Identification) -> str:
         return f"{known}, but no stretch could be free-run to check them."
     depth = np.mean([p.score.depth_fit_percent for p in scored])
     pitch = np.mean([p.score.pitch_fit_percent for p in scored])
+    bent = [note for note in result.notes if note.startswith(("At the edge", "The search stopped"))]
+    if bent or min(depth, pitch) < TRUSTED_FIT:
+        return (
+            f"The linear model does not carry this recording: running freely it reproduces {depth:.1f} % of "
+            f"the depth and {pitch:.1f} % of the pitch motion. `mils diagnose` says what is missing."
+        )
     seen = "data it never saw" if result.held_out is not None else "the data it was learnt from"
     return (
         f"{known}. Running freely over {seen}, the model "
@@ -85,12 +93,22 @@ def _parameters(result: Identification) -> list[dict[str, Any]]:
                 "meaning": parameter.meaning,
                 "unit": parameter.unit,
                 "value": f"{value:.4g}" if is_known else "not found",
-                "std": f"{std:.2g}" if std > 0.0 else "given" if is_known else "",
-                "interval": f"{value - 1.96 * std:.4g} to {value + 1.96 * std:.4g}" if std > 0.0 else "",
+                "std": _deviation(std, is_known),
+                "interval": f"{value - 1.96 * std:.4g} to {value + 1.96 * std:.4g}"
+                if 0.0 < std < np.inf
+                else "",
                 "open": parameter.name in result.undetermined,
             }
         )
     return rows
+
+
+def _deviation(std: float, is_known: bool) -> str:
+    if not is_known:
+        return ""
+    if std == 0.0:
+        return "given"
+    return f"{std:.2g}" if np.isfinite(std) else "unknown"
 
 
 def _scores(result: Identification) -> list[dict[str, Any]]:

@@ -186,7 +186,7 @@ def _pitch_valleys(stretches: list[_Stretch], slowest: float, fastest: float) ->
         if all(np.max(np.abs(found.x - other)) > 0.3 for _, other in valleys):
             valleys.append((found.fun, found.x))
     valleys.sort(key=lambda valley: valley[0])
-    near_best = [point for value, point in valleys if value < 4.0 * valleys[0][0]]
+    near_best = [point for value, point in valleys if value <= 4.0 * valleys[0][0]]
     return [(float(np.exp(point[0])), float(np.exp(point[1]))) for point in near_best]
 
 
@@ -208,4 +208,4 @@ def _heave_valleys(
         refined = minimize_scalar(cost, bounds=bracket, method="bounded", options=dict(xatol=0.02))
         found.append((float(refined.fun), -float(np.exp(refined.x))))
     found.sort()
-    return [a1 for value, a1 in found if value < 1.5 * found[0][0]]
+    return [a1 for value, a1 in found if value <= 1.5 * found[0][0]]

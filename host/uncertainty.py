@@ -30,7 +30,8 @@ def covariance(fit: Fit) -> Array:
 
 def _safe_inverse(M: Array) -> Array:
     """Inverse by scaled eigenvectors; directions without information get a huge but finite variance."""
-    scale = np.sqrt(np.maximum(np.diag(M), 1e-100))
+    M = np.nan_to_num(M, nan=0.0, posinf=1e100, neginf=-1e100)
+    scale = np.sqrt(np.clip(np.diag(M), 1e-100, None))
     values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
     values = np.maximum(values, 1e-14)
     return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))

@@ -112,6 +112,7 @@ EFFECTS = (
         actuator=_lag,
         state="lagged",
         initial=_at_command,
+        is_common=True,
     ),
     Effect(
         name="actuator_backlash",

@@ -40,6 +40,7 @@ EFFECTS = (
         probes=((0.5,), (-0.5,)),
         scales=("speed",),
         force=_coupling,
+        is_common=True,
     ),
     Effect(
         name="heave_quadratic_drag",
@@ -50,6 +51,7 @@ EFFECTS = (
         manoeuvre="plane steps of several sizes, the largest held for five heave time constants",
         probes=((-1.0,),),
         force=_drag,
+        is_common=True,
     ),
     Effect(
         name="net_buoyancy",

@@ -22,5 +22,6 @@ EFFECTS = (
         manoeuvre="climbs and dives at the largest pitch angle allowed",
         probes=((1.0,),),
         force=_large_angle,
+        is_common=True,
     ),
 )

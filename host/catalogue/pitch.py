@@ -31,6 +31,7 @@ EFFECTS = (
         manoeuvre="quick plane reversals of several sizes",
         probes=((-2.0,),),
         force=_damping,
+        is_common=True,
     ),
     Effect(
         name="trim_moment",
@@ -53,6 +54,7 @@ EFFECTS = (
         manoeuvre="plane steps held for several heave time constants, longer than the pitch transient",
         probes=((0.5,), (-0.5,)),
         force=_munk,
+        is_common=True,
     ),
     Effect(
         name="large_angle_restoring",
@@ -65,5 +67,6 @@ EFFECTS = (
         manoeuvre="climbs and dives at the largest pitch angle allowed",
         probes=((1.0,),),
         force=_restoring,
+        is_common=True,
     ),
 )

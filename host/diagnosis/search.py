@@ -22,21 +22,12 @@ from host.recording import Array, Recording
 
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis a trim offset is an effect with a name
 NAMING_MARGIN = 12.0  # of BIC, beyond which an effect pays; holds false naming down over the whole catalogue
+RARITY = 4.0  # of BIC, odds of 7 to 1 against what not every vehicle has: decides between exact twins
 BEAM = 4
 PROMISING = 6
 LARGEST_SET = 5
 # Enough to rank sets; those that count are polished.
 FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 3, 12, 0.5
-
-CORE = {
-    "heave_pitch_rate_coupling",
-    "heave_quadratic_drag",
-    "munk_moment",
-    "pitch_quadratic_damping",
-    "large_angle_kinematics",
-    "large_angle_restoring",
-    "actuator_lag",
-}
 
 Names = frozenset[str]
 Progress = Callable[[str], None]
@@ -161,15 +152,19 @@ class Search:
         )
 
     def _promising(self, parent: Explanation, most: int) -> list[Effect]:
-        """Effects to fit in earnest: those predicted to gain most, and the core of every vehicle.
+        """Effects to fit in earnest: those predicted to gain most, and those every vehicle has.
 
-        The prediction is local. A base bent far from the truth hides what the core effects, which trade
+        The prediction is local. A base bent far from the truth hides what the common effects, which trade
         against its own coefficients, would gain once all of them are free; so these are always tried.
         """
         gains = self.gains(parent)
         order = sorted(gains, key=lambda name: -gains[name])
         worth = {name for name in order[:most] if gains[name] > NAMING_MARGIN}
-        return [effect for effect in CATALOGUE if effect.name in gains and effect.name in worth | CORE]
+        return [
+            effect
+            for effect in CATALOGUE
+            if effect.name in gains and (effect.is_common or effect.name in worth)
+        ]
 
     def _probed(self, parent: Explanation, effect: Effect) -> list[tuple[float, Array]]:
         """Predicted gain and values of each probe of an effect: one Gauss-Newton step from there."""
@@ -263,7 +258,8 @@ class Search:
         return self._inputs[names]
 
     def _remember(self, names: Names, fit: Fit) -> Explanation:
-        bic = -2.0 * fit.log_likelihood + self.free_parameters(names) * log(fit.samples)
+        rare = sum(not effect.is_common for effect in structure_of(names).effects)
+        bic = -2.0 * fit.log_likelihood + self.free_parameters(names) * log(fit.samples) + RARITY * rare
         if names not in self.tried or bic < self.tried[names].bic:
             self.tried[names] = Explanation(names, fit, bic)
         return self.tried[names]

@@ -1,0 +1,54 @@
+"""Every entry of the catalogue: complete, differentiable, and acting."""
+
+import numpy as np
+import pytest
+from hidden_dive import BASE, hidden_dive
+
+from host.catalogue import BY_NAME, CATALOGUE, structure_of
+from host.propagate import free_run, innovations, inputs_of
+
+NAMES_OF_THE_FORMAT = {
+    "heave_pitch_rate_coupling", "heave_quadratic_drag", "net_buoyancy", "depth_dependent_buoyancy",
+    "ballast_change", "pitch_quadratic_damping", "trim_moment", "munk_moment", "large_angle_restoring",
+    "large_angle_kinematics", "speed_loss", "actuator_lag", "actuator_delay", "actuator_rate_limit",
+    "actuator_saturation", "actuator_backlash", "rudder_offset", "rudder_stall",
+    "rudder_effectiveness_change", "depth_sensor_lever_arm", "depth_sensor_lag", "pitch_bias",
+    "pitch_sensor_lag", "vertical_current", "internal_wave", "surface_waves",
+}  # fmt: skip
+SCALES = {"": 1.0, "speed": 2.5, "rudder": 0.25, "duration": 30.0, "depth": 20.0}
+START = np.array([0.05, 0.02, 0.03, 20.0])
+
+
+def probe_of(name: str) -> np.ndarray:  # type: ignore[type-arg]
+    effect = BY_NAME[name]
+    scales = effect.scales or ("",) * len(effect.parameters)
+    values = [v * SCALES[s] for v, s in zip(effect.probes[-1], scales, strict=True)]
+    # Amplitudes that start at nothing are given a size here, or there would be nothing to see.
+    return np.array([value if value else 0.03 for value in values])
+
+
+def test_catalogue_holds_every_name_that_users_rely_on() -> None:
+    assert {effect.name for effect in CATALOGUE} == NAMES_OF_THE_FORMAT
+
+
+@pytest.mark.parametrize("name", sorted(NAMES_OF_THE_FORMAT))
+def test_effect_acts_and_its_sensitivities_are_exact(name: str) -> None:
+    recording = hidden_dive(duration=30.0)
+    structure = structure_of((name,))
+    inputs = inputs_of(recording, structure)
+    values = np.concatenate([[*BASE.values(), 0.0, 0.0], probe_of(name)])
+    run = free_run(values, START, inputs).outputs
+    plain = free_run(values[:8], START, inputs_of(recording)).outputs
+    assert np.abs(run - plain).max() > 1e-5
+    _, sensitivity = innovations(values, START, inputs)
+    for index in range(8, values.size):
+        change = np.zeros(values.size)
+        change[index] = 1e-6 * max(1.0, abs(values[index]))
+        ends = [free_run(values + sign * change, START, inputs).outputs for sign in (1.0, -1.0)]
+        slope = (ends[0] - ends[1]) / (2.0 * change[index])
+        assert np.allclose(sensitivity[:, index], slope, atol=2e-4 * max(np.abs(slope).max(), 1e-6))
+
+
+def test_an_unknown_effect_is_a_key_error() -> None:
+    with pytest.raises(KeyError, match="warp"):
+        structure_of(("warp",))

@@ -1,0 +1,84 @@
+"""Hidden physics is found, nothing is found where nothing is hidden, and the answer can be used."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hidden_dive import hidden_dive
+
+from host.diagnosis.diagnose import diagnose
+from host.diagnosis.noise_floor import noise_floor
+from host.diagnosis.spans import divide
+from tools.cli import main
+
+
+def test_noise_floor_is_that_of_the_sensors() -> None:
+    floor = np.sqrt(noise_floor([hidden_dive()]))
+    assert floor == pytest.approx([np.deg2rad(0.1), 0.01], rel=0.15)
+
+
+def test_judging_spans_teach_nothing() -> None:
+    recording = hidden_dive()
+    spans = divide([recording])
+    taught = {time for piece in spans.teaching for time in piece.time}
+    judged = {time for piece in spans.judging for time in piece.time}
+    assert not taught & judged
+    assert taught | judged == set(recording.time)
+    assert 0.25 < len(judged) / recording.time.size < 0.42
+
+
+def test_nothing_hidden_is_no_mismatch() -> None:
+    found = diagnose([hidden_dive()])
+    assert found.verdict == "no_mismatch"
+    assert not found.effects
+    assert sum(found.slots.values()) == 0.0
+
+
+def test_coupling_of_pitch_rate_into_heave_is_named_with_its_coefficient() -> None:
+    found = diagnose([hidden_dive(lambda _, x, __: (0.8 * x[1], 0.0, 0.0), duration=120.0)])
+    assert found.verdict == "explained"
+    assert found.effects[0].name == "heave_pitch_rate_coupling"
+    value, std, unit = found.effects[0].coefficients["c_wq"]
+    assert unit == "m/s"
+    assert abs(value - 0.8) < 4.0 * std
+    assert sum(found.slots.values()) == pytest.approx(1.0)
+    assert found.extended_misfit.chi2 < found.base_misfit.chi2
+    assert found.effects[0].heldout_gain > 0.0
+    # With one input and u0 unknown a lever arm gives the same transfer function: it must be admitted.
+    assert "depth_sensor_lever_arm" in found.effects[0].twins
+
+
+@pytest.mark.long
+def test_two_hidden_effects_are_both_named() -> None:
+    def both(_: float, x: np.ndarray, __: float) -> tuple[float, float, float]:  # type: ignore[type-arg]
+        return -1.5 * x[0] * abs(x[0]) + 0.8 * x[1], 0.0, 0.0
+
+    found = diagnose([hidden_dive(both, duration=200.0)])
+    assert {"heave_pitch_rate_coupling", "heave_quadratic_drag"} <= {e.name for e in found.effects}
+
+
+def test_the_command_writes_an_answer_that_can_be_simulated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dive = hidden_dive(lambda _, x, __: (0.8 * x[1], 0.0, 0.0), seed=1, duration=70.0)
+    path = tmp_path / "dive.csv"
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["time_s", "depth_m", "pitch_rad", "rudder_rad"])
+        writer.writerows(zip(dive.time, dive.depth, dive.pitch, dive.rudder, strict=True))
+    assert main(["diagnose", str(path), "--out", str(tmp_path), "--quiet"]) in (0, 1)
+    assert "heave_pitch_rate_coupling" in capsys.readouterr().out
+    answer = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert set(answer) >= {"schema", "verdict", "base", "location", "effects", "extended", "remaining"}
+    assert answer["effects"][0]["name"] == "heave_pitch_rate_coupling"
+    assert sum(answer["location"]["slots"].values()) == pytest.approx(1.0)
+    page = (tmp_path / "report.html").read_text()
+    assert page.count("data:image/png;base64,") == 3
+    assert "https://" not in page
+    score = tmp_path / "score.json"
+    assert main(["predict", str(tmp_path / "extended_model.json"), str(path), "--json", str(score)]) == 0
+    assert json.loads(score.read_text())["depth_rmse_m"] < 0.05
+    sim = tmp_path / "sim.csv"
+    assert main(["simulate", str(tmp_path / "extended_model.json"), str(path), "--out", str(sim)]) == 0
