@@ -11,7 +11,7 @@ from tools.sitl.recording import Table, measure
 from tools.trial.answers import Answer, Floor
 from tools.trial.coefficients import true_coefficients
 from tools.trial.deck import Card
-from tools.trial.hidden import KINDS, Hidden, Setting, draw_hidden, switched, with_strength
+from tools.trial.hidden import KINDS, STRANGERS, Hidden, Setting, draw_hidden, switched, with_strength
 from tools.trial.outing import Outing, draw_outing, with_amplitude
 from tools.trial.sizing import (
     Yardstick,
@@ -29,8 +29,8 @@ MISFIT = (50.0, 20000.0)
 FOREIGN_MISFIT = (500.0, 20000.0)
 """The same outside the catalogue, beyond all linear equations, as part of it is explained by those inside."""
 MOST_COMMAND = 0.45  # rad, where planes have their stops
-MOST_ATTEMPTS = 60
-PATIENCE = 15  # attempts with two effects before two others are drawn: some pairs are one effect to any eye
+MOST_ATTEMPTS = 200
+PATIENCE = 20  # attempts before other effects are drawn: some pairs are one effect to any eye
 
 
 class CannotDraw(Exception):
@@ -49,9 +49,10 @@ def draw(seed: int, number: int, card: Card) -> Drawn:
     """Recording `number` of a trial: vehicles and outings are drawn until all on the card can be seen."""
     for attempt in range(MOST_ATTEMPTS):
         rng = np.random.default_rng([seed, 4, number, attempt])
-        if card.case == "two" and attempt > 0 and attempt % PATIENCE == 0:
-            first, second = rng.choice(tuple(KINDS), 2, replace=False)
-            card = Card(card.case, (str(first), str(second)))
+        if card.names and attempt > 0 and attempt % PATIENCE == 0:
+            family = tuple(STRANGERS if card.case == "outside" else KINDS)
+            names = rng.choice(family, len(card.names), replace=False).tolist()
+            card = Card(card.case, tuple(names))
         drawn = _attempt(rng, number, card)
         if drawn is not None:
             return drawn

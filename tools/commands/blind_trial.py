@@ -1,0 +1,71 @@
+"""`mils blind-trial`: recordings that hide physics, diagnosed blind, and the score."""
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from tools.bench import require_bench
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--out", type=Path, default=Path("trial"), metavar="DIR", help="where everything goes"
+    )
+    parser.add_argument("--count", type=int, default=300, metavar="N", help="recordings (default 300)")
+    parser.add_argument("--seed", type=int, help="repeats a trial; without it nobody knows the answers")
+    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes at once (default 2)")
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0 when every bar is met, 1 when one is missed. An interrupted trial in DIR is taken up again."""
+    require_bench()
+    from rich.console import Console
+
+    from tools.paper.stages import stages
+    from tools.trial.answers import SEALED, BrokenSeal, open_answers, published
+    from tools.trial.judge import judge
+    from tools.trial.page import print_score, write_json, write_page
+    from tools.trial.recorded import read_recorded
+    from tools.trial.run import diagnose_all, read_diagnosis, read_model
+    from tools.trial.score import score
+    from tools.trial.writing import RECORDINGS, recordings, write_trial
+
+    folder: Path = args.out
+    if args.count < 1 or args.jobs < 1:
+        print("mils: --count and --jobs must be at least 1", file=sys.stderr)
+        return 2
+    with stages(args.quiet) as stage:
+        digest = published(folder)
+        if digest is None:
+            seed = int.from_bytes(os.urandom(6)) if args.seed is None else args.seed
+            with stage("drawing vehicles", args.count) as step:
+                digest = write_trial(folder, seed, args.count, args.jobs, step)
+        print(f"answers sealed: SHA-256 {digest}  {folder / SEALED}", flush=True)
+        paths = recordings(folder)
+        with stage("diagnosing", len(paths)) as step:
+            runs = diagnose_all(folder, paths, args.jobs, step)
+    try:
+        seed, answers = open_answers(folder, digest)
+    except BrokenSeal as error:
+        print(f"mils: {error}", file=sys.stderr)
+        return 2
+    print(f"answers opened, the seal is whole; seed {seed}")
+    judged = [
+        judge(
+            answer,
+            read_recorded(folder / RECORDINGS / f"{answer.name}.csv"),
+            read_diagnosis(folder, answer.name) if runs[answer.name].has_answered else None,
+            read_model(folder, answer.name),
+            runs[answer.name].seconds,
+            runs[answer.name].memory_mb,
+        )
+        for answer in answers
+    ]
+    result = score(judged)
+    print_score(result, Console(width=None if sys.stdout.isatty() else 110))
+    write_json(folder / "trial.json", seed, digest, result, judged)
+    write_page(folder / "trial.html", seed, digest, result, judged)
+    print(f"report: {folder / 'trial.html'}\nfigures: {folder / 'trial.json'}")
+    return 1 if any(rate.is_met is False for rate in result.rates) else 0
