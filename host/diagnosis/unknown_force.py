@@ -57,7 +57,8 @@ def unknown_force(
             S = H @ P @ H.T + np.diag(floor[seen])
             K = np.linalg.solve(S, H @ P).T
             x = x + K @ (measured[seen, k] - H @ x)
-            P = P - K @ S @ K.T
+            kept = np.eye(6) - K @ H
+            P = kept @ P @ kept.T + K @ np.diag(floor[seen]) @ K.T  # Joseph's form: stays symmetric
         after[k], P_after[k] = x, P
         x = Phi @ x + Gamma * recording.rudder[k]
         P = Phi @ P @ Phi.T + Q
@@ -68,5 +69,6 @@ def unknown_force(
             G = np.linalg.solve(P_before[k + 1], Phi @ P_after[k]).T
             smooth = after[k] + G @ (smooth - before[k + 1])
             P_smooth = P_after[k] + G @ (P_smooth - P_before[k + 1]) @ G.T
+            P_smooth = 0.5 * (P_smooth + P_smooth.T)
         values[:, k], variance[:, k] = smooth[4:], np.diag(P_smooth)[4:]
     return UnknownForce(values=values, std=np.sqrt(np.maximum(variance, 0.0)))
