@@ -31,7 +31,9 @@ class RobustConfig:
     speed_std: float | None = (
         None  # m/s, 0 or more: of the configured speed; None for half of it, 0 trusts it
     )
-    heave_pitch_rate_coupling: bool = False  # whether pitch rate acts on heave: w' = ... + c_wq q
+    # Whether pitch rate acts on heave, w' = ... + c_wq q, as on most vehicles; None: yes where the speed is
+    # measured. Without a measured speed it makes u0 and b1 several times less certain.
+    heave_pitch_rate_coupling: bool | None = None
     drift: float = 0.0  # 0 or more: relative change of a parameter to be followed, in 100 s
     rudder_hold: float = 1.0  # s, 0 or more: how long a rudder that is not measured is taken as held
     rest_time: float = 30.0  # s, above 0: without excitation for so long, the vehicle is at rest

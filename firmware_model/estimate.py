@@ -16,12 +16,14 @@ class Estimate:
     a1, a2    1/s        heave and pitch damping
     a3        1/s^2      pitch restoring moment
     b1, b2    m/s^2/rad, 1/s^2  heave force and pitch moment of the stern plane
-    u0        m/s        forward speed: slow average of the measured one, else estimated (robust) or
-    configured c_wq      m/s per rad  heave force of the pitch rate, w' = ... + c_wq q; NaN where it is not
-    estimated std       standard deviation of each; of a measured speed its spread, of a configured one 0
-    valid     by parameter, with hysteresis in the relative standard deviation car_pitch alpha1..alpha3
-    car_depth  beta1..beta7, both as in the paper samples   accepted              updates    of them, samples
-    that something was learnt from refused   samples by cause      seconds    of data learnt from
+    u0        m/s        forward speed: mean of the measured one, else estimated (robust) or configured
+    c_wq      m/s        heave force of the pitch rate, w' = ... + c_wq q; NaN where it is not estimated
+    heave_offset, pitch_offset  m/s^2, rad/s^2  forces of an imperfect trim; 0 where they are not estimated
+    std       standard deviation of each; of a measured speed its spread, of a configured one 0
+    valid     by parameter, with hysteresis in the relative standard deviation
+    car_pitch alpha1..alpha3        car_depth  beta1..beta7, both as in the paper
+    samples   accepted              updates    of them, samples that something was learnt from
+    refused   samples by cause      seconds    of data learnt from
     """
 
     a1: float
@@ -31,6 +33,8 @@ class Estimate:
     b2: float
     u0: float
     c_wq: float = math.nan
+    heave_offset: float = 0.0
+    pitch_offset: float = 0.0
     std: Mapping[str, float]
     valid: Mapping[str, bool]
     car_pitch: tuple[float, ...]

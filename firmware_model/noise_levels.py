@@ -7,6 +7,9 @@ LIKELY = 9.0
 LIKELY_MEAN = 0.9974
 """Mean of min(chi-squared of one degree, LIKELY)."""
 
+EARLY = 5.0
+"""Samples that the configured level counts for."""
+
 
 class SensorNoise:
     """Variance R of one sensor's white noise.
@@ -32,7 +35,7 @@ class SensorNoise:
         share = self.variance / innovation_variance
         weight = share * share
         self.samples += weight
-        count = self.samples + 20.0
+        count = self.samples + EARLY
         if count > self._memory:
             count = self._memory
         change = weight * ((squared if squared < LIKELY else LIKELY) - LIKELY_MEAN) / count
@@ -51,9 +54,10 @@ class ForceNoise:
         `time`
     """
 
-    def __init__(self, step: float, *, highest: float, lowest: float, target: float, time: float) -> None:
+    def __init__(self, step: float, *, first: float, highest: float, target: float, time: float) -> None:
+        self._first = first
         self._highest = highest
-        self._lowest = lowest
+        self._lowest = 5e-8 * highest
         self._target = target
         self._fade = math.exp(-step / time)
         self._keep = math.sqrt(1.0 - self._fade * self._fade)
@@ -62,7 +66,7 @@ class ForceNoise:
         self.reset()
 
     def reset(self) -> None:
-        self.density = self._highest
+        self.density = self._first
         self.forget()
 
     def forget(self) -> None:

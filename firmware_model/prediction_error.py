@@ -78,26 +78,25 @@ class PredictionError:
     def __init__(self, config: EstimatorConfig) -> None:
         own = config.robust
         self._step = config.step
-        self._has_coupling = own.heave_pitch_rate_coupling
+        self._coupling = own.heave_pitch_rate_coupling
         self._configured_speed = config.speed
         T, speed, plane = own.pitch_time, config.speed, 0.25 / own.typical_rudder
         speed_std = 0.5 * speed if own.speed_std is None else own.speed_std
-        coupling_std = 0.5 * speed if self._has_coupling else 0.0
+        self._coupling_std = 0.5 * speed
         self._mean = [0.0] * COUNT
         self._mean[A1], self._mean[A2], self._mean[A3] = -1.0 / T, -3.0 / T, -5.0 / (T * T)
         self._std = [0.0] * COUNT
         self._std[A1], self._std[A2], self._std[A3] = 1.0 / T, 3.0 / T, 5.0 / (T * T)
         self._std[B1], self._std[B2] = 0.5 * plane * speed / T, 5.0 * plane / (T * T)
-        self._std[KAPPA] = math.hypot(speed_std, coupling_std)
+        self._std[KAPPA] = math.hypot(speed_std, self._coupling_std if self._coupling else 0.0)
         self._std[GAMMA] = 1.5 * speed_std / T
         self._std[HEAVE_TRIM], self._std[PITCH_TRIM] = 0.05 * speed / T, 0.3 / (T * T)
         self._std[W], self._std[Q] = 0.25 * speed, 0.5 / T
         self._std[THETA], self._std[ZETA] = 0.3, 2.5 * speed * T
-        self._coupling_std = coupling_std
         self._lower = {A1: -20.0 / T, A2: -20.0 / T, A3: -200.0 / (T * T)}
         self._upper = {A1: -0.02 / T, A2: -0.05 / T, A3: -0.05 / (T * T)}
         self._annealing = (SELF_ANNEALING[0] * T, SELF_ANNEALING[1] * T)
-        # Most that the second-order variance may add, and the force noise at the start, as densities.
+        # Most that the second-order variance may add, as densities.
         heave, pitch = speed * speed / T, 1.0 / (T * T * T)
         self._most = (0.0125 * heave, 0.02 * pitch)
         self._drift = own.drift * own.drift / 100.0
@@ -111,8 +110,9 @@ class PredictionError:
         self.ud = UdFactors(COUNT, PATTERN, driven=(0, 1))
 
         def force(highest: float) -> ForceNoise:
-            lowest = 5e-8 * highest
-            return ForceNoise(config.step, highest=highest, lowest=lowest, target=CORRELATION, time=0.5 * T)
+            # Small at first: what is not known yet adds its own noise, and true forces soon raise the level.
+            first = 0.002 * highest
+            return ForceNoise(config.step, first=first, highest=highest, target=CORRELATION, time=0.5 * T)
 
         def noise(std: float, resolution: float) -> SensorNoise:
             return SensorNoise(std * std, resolution * resolution / 12.0, SENSOR_MEMORY)
@@ -179,16 +179,23 @@ class PredictionError:
         self._row[entry] = 1.0
         self.ud.add(self._row, variance)
 
+    @property
+    def has_coupling(self) -> bool:
+        """Whether pitch rate may act on heave."""
+        return self.is_speed_known if self._coupling is None else self._coupling
+
     def measure_speed(self, speed: float, has_learnt: bool) -> None:
         """Takes the speed as known from here on. w, a velocity through the water, does not jump with it."""
         if not self.is_speed_known:
             self.is_speed_known = True
-            if has_learnt:
+            # A coupling that was not allowed for until now may be hidden in what was learnt.
+            if has_learnt and self._coupling is not None:
                 self._adopt(speed)
             else:
                 self._set_prior()
+                self.restart()
                 self.ud.D[GAMMA] = 0.0
-                self.ud.D[KAPPA] = self._coupling_std * self._coupling_std
+                self.ud.D[KAPPA] = self._coupling_std * self._coupling_std if self.has_coupling else 0.0
         self.speed = speed
 
     def _adopt(self, speed: float) -> None:
@@ -199,7 +206,7 @@ class PredictionError:
         ud.x[GAMMA] -= change * ud.x[A1]
         ud.L[A1][GAMMA] -= change
         ud.observe_entry(GAMMA, -ud.x[GAMMA], EXACT)
-        if not self._has_coupling:
+        if not self._coupling:
             ud.observe_entry(KAPPA, -ud.x[KAPPA], EXACT)
         self.restart()
 
@@ -271,7 +278,7 @@ class PredictionError:
 
     def settle(self) -> None:
         """Ends an instant: the structure gamma = a1 kappa, the bounds of a stable vehicle, the window."""
-        if self.depth.is_started and not self._has_coupling and not self.is_speed_known:
+        if self.depth.is_started and not self.has_coupling and not self.is_speed_known:
             self._learn_product()
         self.heave_is_at_bound = self._hold_within_bounds(A1)
         pitch_damping_is = self._hold_within_bounds(A2)
@@ -299,9 +306,16 @@ class PredictionError:
         ud.observe(row, a1 * kappa + together - ud.x[GAMMA], PRODUCT_CAUTION * variance + 1e-10)
 
     @property
+    def trim(self) -> tuple[float, float, float, float]:
+        """Forces of trim in heave, m/s^2, and pitch, rad/s^2, and their standard deviations."""
+        ud = self.ud
+        heave, pitch = ud.covariance(HEAVE_TRIM, HEAVE_TRIM), ud.covariance(PITCH_TRIM, PITCH_TRIM)
+        return ud.x[HEAVE_TRIM], ud.x[PITCH_TRIM], math.sqrt(heave), math.sqrt(pitch)
+
+    @property
     def speed_estimate(self) -> tuple[float, float]:
         """u0 and its standard deviation, m/s, where it is not measured."""
-        if not self._has_coupling:
+        if not self.has_coupling:
             return self.speed + self.ud.x[KAPPA], self._deviation(0.0, 1.0, 0.0)
         a1, gamma = self.ud.x[A1], self.ud.x[GAMMA]
         return self.speed + gamma / a1, self._deviation(-gamma / (a1 * a1), 0.0, 1.0 / a1)
@@ -309,7 +323,7 @@ class PredictionError:
     @property
     def coupling(self) -> tuple[float, float]:
         """c_wq of w' = ... + c_wq q and its standard deviation, m/s per rad; NaN where not estimated."""
-        if not self._has_coupling:
+        if not self.has_coupling:
             return math.nan, math.nan
         a1, gamma, kappa = self.ud.x[A1], self.ud.x[GAMMA], self.ud.x[KAPPA]
         return gamma / a1 - kappa, self._deviation(-gamma / (a1 * a1), -1.0, 1.0 / a1)

@@ -48,7 +48,7 @@ class RobustEstimator:
         self._speed = MovingVariance(SPEED_SPREAD_S / config.step)
         self._gate = math.inf if config.outlier_gate is None else config.outlier_gate
         self._check_period = max(1, round(CHECK_PERIOD_S / config.step))
-        self._validity = Validity((*PARAMETERS, "u0"), config.valid_below, config.invalid_above)
+        self._validity = Validity((*PARAMETERS, "u0", "c_wq"), config.valid_below, config.invalid_above)
         self._budget = RestartBudget(MOST_RESTARTS, RESTART_REGAIN_S, config.step)
         self._tally = Tally()
         self._is_frozen = False
@@ -200,6 +200,9 @@ class RobustEstimator:
             self._validity.check(name, ud.x[entry], std, is_possible and self._tally.updates > 0)
         u0, std = self._u0
         self._validity.check("u0", u0, std, own.is_speed_known or heave_is_possible)
+        # A coupling may well be zero: it is known when it is known to a small part of the speed.
+        c_wq, std = own.coupling
+        self._validity.check("c_wq", max(abs(c_wq), abs(u0)), std, heave_is_possible and own.has_coupling)
 
     @property
     def _u0(self) -> tuple[float, float]:
@@ -221,13 +224,16 @@ class RobustEstimator:
         }
         u0, std["u0"] = self._u0
         c_wq, std["c_wq"] = self._filter.coupling
+        heave_offset, pitch_offset, std["heave_offset"], std["pitch_offset"] = self._filter.trim
         car_pitch, car_depth = car_from_physical(**values, u0=u0, h=self.config.step)
         return Estimate(
             **values,
             u0=u0,
             c_wq=c_wq,
+            heave_offset=heave_offset,
+            pitch_offset=pitch_offset,
             std=std,
-            valid={**self._validity.valid, "c_wq": False},
+            valid=dict(self._validity.valid),
             car_pitch=car_pitch,
             car_depth=car_depth,
             samples=self._tally.samples,

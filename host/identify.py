@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from host.equations import NAMES
-from host.identify_car import car_least_squares, run_estimator
+from host.identify_car import ESTIMATED, car_least_squares, run_estimator
 from host.maximum_likelihood import Fit, fit_maximum_likelihood
 from host.model import VehicleModel, model_of
 from host.predict import Prediction, predict
@@ -17,8 +17,8 @@ from host.uncertainty import covariance, undetermined
 from host.vehicle import Vehicle
 from host.whiteness import is_white
 
-Method = Literal["car", "mils", "ml"]
-METHODS: tuple[Method, ...] = ("car", "mils", "ml")
+Method = Literal["car", "mils", "robust", "ml"]
+METHODS: tuple[Method, ...] = ("car", "mils", "robust", "ml")
 SHORTEST_TO_SPLIT = 40.0  # s; below it a held-out part would leave too little to learn from
 HELD_OUT_SHARE = 0.3
 UNKNOWN = 1e4  # of a standard deviation in SI: the recording says nothing at all
@@ -85,12 +85,16 @@ def _learn(
         deviations = dict(zip(NAMES, std.tolist(), strict=True))
         model = model_of(recordings, vehicle.name, method, values, deviations, fit.noise)
         return model, fit, None
-    on_progress("regression on CAR rows")
+    on_progress("sample by sample" if method == "robust" else "regression on CAR rows")
     if method == "car":
         values, stds = car_least_squares(recordings, vehicle)
         return model_of(recordings, vehicle.name, method, values, stds), None, None
-    values, stds, history = run_estimator(recordings, vehicle)
-    return model_of(recordings, vehicle.name, method, values, stds), None, history
+    values, stds, history = run_estimator(recordings, vehicle, method)
+    effects = None
+    if "c_wq" in values:
+        c_wq = {"value": values.pop("c_wq"), "std": stds.pop("c_wq"), "unit": "m/s"}
+        effects = [{"name": "heave_pitch_rate_coupling", "parameters": {"c_wq": c_wq}}]
+    return model_of(recordings, vehicle.name, method, values, stds, effects=effects), None, history
 
 
 def _held_out(recordings: list[Recording], vehicle: Vehicle, method: Method) -> list[Prediction] | None:
@@ -116,13 +120,20 @@ def _can_predict(recording: Recording) -> bool:
 
 
 def _open(model: VehicleModel, fit: Fit | None) -> list[str]:
+    if model.provenance["method"] == "robust":
+        values, stds = (np.array([table[name] for name in NAMES]) for table in (model.values, model.std))
+        if not np.isfinite(values).all():
+            return list(ESTIMATED)
+        return undetermined(values, np.diag(stds**2), stds > 0.0)
     if fit is None:
-        return [name for name in ("a1", "a2", "a3", "b1", "b2") if not isfinite(model.values[name])]
+        return [name for name in ESTIMATED if not isfinite(model.values[name])]
     return undetermined(fit.parameters, covariance(fit), fit.free)
 
 
 def _notes(fit: Fit | None, method: Method) -> list[str]:
-    notes = []
+    notes: list[str] = []
+    if method == "robust":
+        return ["As the vehicle learns: each sample was used once, in order. Method ml is more accurate."]
     if fit is None:
         notes.append(
             f"Method {method} regresses on measured signals: with sensor noise its estimates are biased "

@@ -115,11 +115,18 @@ def run_estimator(
     estimate = estimator.estimate()
     values = {name: estimate.values[name] for name in ESTIMATED}
     std = {name: float(estimate.std[name]) for name in ESTIMATED}
-    return (
-        _with_nuisance(values, estimate.u0),
-        _with_nuisance(std, 0.0),
-        {name: np.array(series) for name, series in history.items()},
-    )
+    values |= {
+        "u0": estimate.u0,
+        "heave_offset": estimate.heave_offset,
+        "pitch_offset": estimate.pitch_offset,
+    }
+    std |= {"u0": 0.0, "heave_offset": 0.0, "pitch_offset": 0.0}
+    if method == "robust":
+        std |= {name: float(estimate.std[name]) for name in ("heave_offset", "pitch_offset")}
+        std["u0"] = 0.0 if recordings[0].has_speed else float(estimate.std["u0"])
+        if np.isfinite(estimate.c_wq):
+            values["c_wq"], std["c_wq"] = estimate.c_wq, float(estimate.std["c_wq"])
+    return values, std, {name: np.array(series) for name, series in history.items()}
 
 
 def _with_nuisance(values: dict[str, float], u0: float) -> dict[str, float]:

@@ -21,6 +21,8 @@ COMMANDS = {
     "simulate": "free run of a model on the rudder of a recording",
     "predict": "score a model's free run against a recording",
     "paper": "reproduce the paper's tables and figures, with its errata",
+    "bench-accuracy": "every method on identical simulated dives, against the Cramér-Rao bound",
+    "blind-trial": "diagnose simulated recordings whose hidden physics is sealed away, and score it",
     "doctor": "say what link, device, dependency or compiler is missing and how to get it",
 }
 
@@ -38,7 +40,7 @@ def build_parser(chosen: str | None) -> argparse.ArgumentParser:
     for name, purpose in COMMANDS.items():
         sub = commands.add_parser(name, help=purpose, description=purpose)
         if name == chosen:
-            module = import_module(f"tools.commands.{name}")
+            module = import_module(f"tools.commands.{name.replace('-', '_')}")
             module.add_arguments(sub)
             sub.set_defaults(run=module.run)
     return parser

@@ -10,13 +10,15 @@ RELATIVE_STEP = 1e-5
 def cramer_rao(dive: Dive, speed_is_known: bool = False) -> Array:
     """Smallest standard deviations of a1, a2, a3, b1, b2, u0 (6,), initial state and trims unknown too.
 
-    u0 has the bound NaN where the speed is known.
+    u0 has the bound NaN where the speed is known, all have where the vehicle changes on the way.
     """
     case = dive.case
+    if case.is_drifting:
+        return np.full(6, np.nan)
     truth = np.concatenate([case.vehicle, dive.trim, dive.start])
 
     def outputs(unknowns: Array) -> Array:
-        states = simulate(case, unknowns[:6], dive.rudder, unknowns[8:], unknowns[6:8])
+        states = simulate(case, unknowns[:6], dive.rudder, unknowns[8:], unknowns[6:8, None])
         return states[2:]
 
     scale = np.array([case.pitch_noise, case.depth_noise])[:, None]

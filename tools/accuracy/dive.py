@@ -22,7 +22,7 @@ class Case:
     offsets  standard deviations over dives of the forces of trim: heave m/s^2, pitch rad/s^2
     drift    factors by which a1, a2, a3, b1, b2 change over the dive, linearly from 1
     coupling c_wq of w' = ... + c_wq q
-    waves    amplitude of a sinusoidal heave force, m/s^2, with a period of 7 s
+    forces   white forces that act: heave m/s^2/sqrt(Hz), pitch rad/s^2/sqrt(Hz)
     """
 
     step: float = 0.1
@@ -34,15 +34,24 @@ class Case:
     offsets: tuple[float, float] = (0.0, 0.0)
     drift: tuple[float, float, float, float, float] = (1.0, 1.0, 1.0, 1.0, 1.0)
     coupling: float = 0.0
-    waves: float = 0.0
+    forces: tuple[float, float] = (0.0, 0.0)
     vehicle: tuple[float, ...] = TABLE_1
     amplitude: float = 0.25
     tells_speed: bool = False
 
+    @property
+    def truth(self) -> Array:
+        """a1, a2, a3, b1, b2, u0 at the end of the dive."""
+        return np.array(self.vehicle) * (*self.drift, 1.0)
+
+    @property
+    def is_drifting(self) -> bool:
+        return set(self.drift) != {1.0}
+
 
 @dataclass(frozen=True, kw_only=True)
 class Dive:
-    """One dive, arrays of N; NaN where nothing was measured; `start` is w, q, theta, zeta at the first row."""
+    """One dive, arrays of N; NaN where nothing was measured; `start` is w, q, theta, zeta at its start."""
 
     case: Case
     time: Array
@@ -72,10 +81,13 @@ def fly(case: Case, seed: int) -> Dive:
     trim = rng.normal(size=2) * case.offsets
     noise = rng.normal(size=(2, rudder.size))
     present = ~_lost(rng, case, rudder.size)
-    states = simulate(case, np.array(case.vehicle), rudder, start, trim)
+    pushes = (
+        trim[:, None] + np.array(case.forces)[:, None] * rng.normal(size=(2, rudder.size)) / case.step**0.5
+    )
+    states = simulate(case, np.array(case.vehicle), rudder, start, pushes)
     return Dive(
         case=case,
-        time=case.step * np.arange(rudder.size),
+        time=np.asarray(case.step * np.arange(rudder.size), dtype=np.float64),
         rudder=rudder,
         pitch=np.where(present[0], states[2] + case.pitch_noise * noise[0], np.nan),
         depth=np.where(present[1], states[3] + case.depth_noise * noise[1], np.nan),
@@ -84,12 +96,11 @@ def fly(case: Case, seed: int) -> Dive:
     )
 
 
-def simulate(case: Case, vehicle: Array, rudder: Array, start: Array, trim: Array) -> Array:
-    """States w, q, theta, zeta (4, N)."""
+def simulate(case: Case, vehicle: Array, rudder: Array, start: Array, pushes: Array) -> Array:
+    """States w, q, theta, zeta (4, N); pushes (2, N) or (2, 1), held m/s^2 and rad/s^2."""
     time = case.step * np.arange(rudder.size)
-    inputs = np.vstack([rudder, np.full_like(time, trim[0]), np.full_like(time, trim[1])])
-    inputs[1] += case.waves * np.sin(2.0 * np.pi * time / 7.0)
-    if set(case.drift) == {1.0}:
+    inputs = np.vstack([rudder, np.broadcast_to(pushes, (2, rudder.size))])
+    if not case.is_drifting:
         Phi, Gamma = transition(vehicle, case)
         return _march(Phi, Gamma @ inputs, start)
     states, x = np.empty((4, rudder.size)), start

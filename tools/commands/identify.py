@@ -17,9 +17,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--vehicle", type=Path, help="vehicle file: columns, units, channels, speed")
     parser.add_argument(
         "--method",
-        choices=("car", "mils", "ml"),
+        choices=("car", "mils", "robust", "ml"),
         default="ml",
-        help="ml: maximum likelihood (default, most accurate); mils: the live estimator; car: least squares",
+        help="ml: maximum likelihood (default); robust: as `mils run` learns; mils, car: the paper's regression",
     )
     parser.add_argument(
         "--each", action="store_true", help="one model for each recording instead of one for all"

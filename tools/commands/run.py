@@ -20,7 +20,7 @@ from host.journal import Journal
 from host.live import LiveLoop, Progress
 from host.vehicle import Vehicle, effective_table, read_vehicle
 
-UNITS = {"a1": "1/s", "a2": "1/s", "a3": "1/s^2", "b1": "m/s^2", "b2": "1/s^2", "u0": "m/s"}
+UNITS = {"a1": "1/s", "a2": "1/s", "a3": "1/s^2", "b1": "m/s^2", "b2": "1/s^2", "u0": "m/s", "c_wq": "m/s"}
 WHAT_TO_CHECK = {
     Quantity.DEPTH: "[mavlink] depth_source, or the depth or pressure signal in [can]",
     Quantity.PITCH: "that the vehicle sends ATTITUDE, or the pitch signal in [can]",

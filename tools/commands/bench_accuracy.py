@@ -1,0 +1,34 @@
+"""`mils bench-accuracy`: every method on identical simulated dives, against the Cramér-Rao bound."""
+
+import argparse
+import os
+
+from host.errors import ConfigError
+from tools.bench import progress, require_bench
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--seeds", type=int, default=200, metavar="N", help="dives of each case (default 200)"
+    )
+    parser.add_argument("--quick", action="store_true", help="12 dives of the first case only")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes at once")
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def run(args: argparse.Namespace) -> int:
+    """0 done; 1 if the live or the bench estimator diverged."""
+    require_bench()
+    from tools.accuracy.methods import CASES, COMPARED, DRIFTING, FOLLOWING, LIVE, REGRESSIONS
+    from tools.accuracy.table import measure, show
+
+    if args.seeds < 2 or args.workers < 1:
+        raise ConfigError(f"--seeds must be at least 2 and --workers 1 (got {args.seeds}, {args.workers})")
+    first, *others = CASES
+    pairs = [(first, method) for method in COMPARED]
+    if not args.quick:
+        pairs += [(case, FOLLOWING if case == DRIFTING else LIVE) for case in others]
+    with progress(args.quiet) as say:
+        lines = measure(pairs, 12 if args.quick else args.seeds, args.workers, say)
+    print(show(lines))
+    return int(any(line.score.diverged for line in lines if line.method not in REGRESSIONS))
