@@ -282,10 +282,11 @@ def _whitened_at(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]
 
 
 def _free_run_errors(point: Point, inputs: list[Inputs]) -> list[Array]:
-    return [
-        one.present * (one.measured - free_run(point.parameters, x0, one).outputs)
-        for x0, one in zip(point.initial, inputs, strict=True)
-    ]
+    with np.errstate(invalid="ignore"):  # a trial that runs away is infinite, and refused for it
+        return [
+            one.present * (one.measured - free_run(point.parameters, x0, one).outputs)
+            for x0, one in zip(point.initial, inputs, strict=True)
+        ]
 
 
 def _residual_noise(errors: list[Array], inputs: list[Inputs]) -> Array:

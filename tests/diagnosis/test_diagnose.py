@@ -19,6 +19,12 @@ def test_noise_floor_is_that_of_the_sensors() -> None:
     assert floor == pytest.approx([np.deg2rad(0.1), 0.01], rel=0.15)
 
 
+def test_noise_floor_of_a_channel_slower_than_the_grid() -> None:
+    dive = hidden_dive()
+    dive.depth[1::2] = np.nan
+    assert np.sqrt(noise_floor([dive])[1]) == pytest.approx(0.01, rel=0.2)
+
+
 def test_judging_spans_teach_nothing() -> None:
     recording = hidden_dive()
     spans = divide([recording])
