@@ -12,7 +12,14 @@ MAY_IMPORT = {
     "bridge": set(),
     "host": {"firmware_model", "bridge"},
     "tools/sitl": set(),
+    "tools/trial": set(),
     "tools/commands": OURS,
+}
+# The plant imports nothing else of ours, so that it cannot confirm our errors; nor does the blind trial, the
+# answers of which must not come from what it judges.
+OWN_FOLDERS = {
+    "tools/sitl": ("tools.sitl.",),
+    "tools/trial": ("tools.trial.", "tools.sitl."),
 }
 
 
@@ -34,13 +41,12 @@ def test_package_imports_only_what_the_map_allows(folder: str) -> None:
     own = {folder} if "/" not in folder else set()
     for path in files:
         foreign = imported_roots(path) - own - MAY_IMPORT[folder]
-        if folder == "tools/sitl":
-            # The plant imports its own folder and nothing else of ours: it must not confirm our errors.
+        if folder in OWN_FOLDERS:
             foreign = {
                 node.module
                 for node in ast.walk(ast.parse(path.read_text()))
                 if isinstance(node, ast.ImportFrom)
                 and (node.module or "").split(".")[0] in OURS
-                and not (node.module or "").startswith("tools.sitl")
+                and not f"{node.module}.".startswith(OWN_FOLDERS[folder])
             }
         assert not foreign, f"{path} imports {foreign}"

@@ -11,12 +11,19 @@ Model = Callable[[Array], Array]
 
 
 def remaining(
-    model: Model, start: Array, steps: Array, most_iterations: int = 20, least: float = 0.0
+    model: Model,
+    start: Array,
+    steps: Array,
+    most_iterations: int = 20,
+    least: float = 0.0,
+    is_dear: bool = False,
 ) -> float:
     """The least sum of squared residuals, by Levenberg and Marquardt with differences over `steps`.
 
     Over noise of unit deviation this is the expected gain in chi2 of whoever knows what is hidden. Stops
     early once below `least`.
+
+    is_dear    take differences once and then learn the slopes from each step (Broyden's update)
     """
     best = start
     residual = model(best[None, :])[0]
@@ -24,22 +31,32 @@ def remaining(
     if not np.isfinite(cost):
         return np.inf
     damping = 1e-4
-    for _ in range(most_iterations):
-        slopes = (model(best + np.diag(steps)) - residual) / steps[:, None]
+    slopes = _slopes(model, best, residual, steps)
+    for iteration in range(most_iterations):
+        if iteration > 0 and not is_dear:
+            slopes = _slopes(model, best, residual, steps)
         scale = np.sqrt(np.sum(slopes**2, axis=1)) + 1e-12
-        normal = (slopes / scale[:, None]) @ (slopes / scale[:, None]).T
-        gradient = (slopes / scale[:, None]) @ residual
+        scaled = slopes / scale[:, None]
         before = cost
         for _ in range(6):
-            change = np.linalg.solve(normal + damping * np.eye(len(best)), -gradient) / scale
-            tried = model((best + change)[None, :])[0]
+            step = (
+                np.linalg.solve(scaled @ scaled.T + damping * np.eye(len(best)), -scaled @ residual) / scale
+            )
+            tried = model((best + step)[None, :])[0]
             with np.errstate(over="ignore", invalid="ignore"):
                 tried_cost = float(tried @ tried)
             if tried_cost < cost:
-                best, residual, cost = best + change, tried, tried_cost
+                if is_dear:
+                    share = step * scale**2 / float(step @ (step * scale**2))
+                    slopes = slopes + np.outer(share, tried - residual - step @ slopes)
+                best, residual, cost = best + step, tried, tried_cost
                 damping = max(damping / 10, 1e-9)
                 break
             damping *= 10
         if cost < least or cost > 0.99 * before:
             break
     return cost
+
+
+def _slopes(model: Model, at: Array, residual: Array, steps: Array) -> Array:
+    return (model(at + np.diag(steps)) - residual) / steps[:, None]

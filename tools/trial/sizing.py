@@ -137,7 +137,7 @@ def misfit_beside(
                 rows.append(np.full(int(noise.has_pitch.sum() + noise.has_depth.sum()), np.inf))
         return np.array(rows)
 
-    return remaining(model, first, steps, most_iterations=4, least=least)
+    return remaining(model, first, steps, most_iterations=6, least=least, is_dear=True)
 
 
 def strength_for(wanted: float, misfit_at: Callable[[float], float]) -> float | None:

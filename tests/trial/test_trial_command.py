@@ -1,0 +1,28 @@
+"""`mils blind-trial` from end to end."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tools.cli import main
+
+
+@pytest.mark.long
+def test_a_small_trial_runs_and_is_taken_up_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["blind-trial", "--out", str(tmp_path), "--count", "2", "--seed", "3", "--quiet"]
+    assert main(words) in (0, 1)
+    first = json.loads((tmp_path / "trial.json").read_text())
+    assert first["recordings"] == 2
+    assert first["failed"] == []
+    assert (tmp_path / "trial.html").is_file()
+    said = capsys.readouterr().out
+    assert first["answers_sha256"] in said
+    assert said.index("answers sealed") < said.index("answers opened")
+    assert main(words) in (0, 1)
+    assert json.loads((tmp_path / "trial.json").read_text()) == first
+
+
+def test_nonsense_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["blind-trial", "--out", str(tmp_path), "--count", "0"]) == 2
+    assert capsys.readouterr().err.startswith("mils: --count")

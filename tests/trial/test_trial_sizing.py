@@ -1,0 +1,110 @@
+"""Refits, strengths, and the coefficients that an answer claims."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from host.catalogue import BY_NAME
+from tools.trial.coefficients import true_coefficients
+from tools.trial.hidden import KINDS, STRANGERS, Setting, draw_hidden
+from tools.trial.linear import MORE, free_run
+from tools.trial.outing import draw_outing, with_amplitude
+from tools.trial.refit import remaining
+from tools.trial.sizing import WEAKEST, strength_for
+from tools.trial.vehicle import draw_vehicle
+from tools.trial.voyage import sail
+
+
+def test_remaining_is_what_least_squares_leaves() -> None:
+    rng = np.random.default_rng(1)
+    rows, wanted = rng.normal(size=(40, 3)), rng.normal(size=40)
+    least = float(np.linalg.lstsq(rows, wanted, rcond=None)[1][0])
+    found = remaining(lambda sets: sets @ rows.T - wanted, np.zeros(3), np.full(3, 1e-3))
+    assert found == pytest.approx(least, rel=1e-6)
+
+
+@pytest.mark.parametrize("is_dear", [False, True])
+def test_remaining_of_a_bent_model_with_and_without_learnt_slopes(is_dear: bool) -> None:
+    t = np.linspace(0.0, 3.0, 60)
+    truth = np.exp(-1.3 * t) + 0.5 * np.sin(t)
+
+    def model(sets: np.ndarray) -> np.ndarray:
+        return sets[:, :1] * np.exp(-sets[:, 1:] * t) - truth
+
+    found = remaining(model, np.array([1.0, 1.0]), np.full(2, 1e-4), is_dear=is_dear)
+    grid = np.array([[a, b] for a in np.linspace(0.8, 1.4, 121) for b in np.linspace(0.0, 0.6, 121)])
+    assert found == pytest.approx(float(np.sum(model(grid) ** 2, axis=1).min()), rel=0.02)
+
+
+def test_remaining_of_a_run_that_fails_is_endless() -> None:
+    assert remaining(lambda sets: np.full((len(sets), 4), np.inf), np.zeros(2), np.ones(2)) == np.inf
+
+
+@pytest.mark.parametrize(
+    "misfit_at",
+    [
+        lambda s: 1e6 * s**2,
+        lambda s: 1e9 * s**4,
+        lambda s: 0.0 if s < 0.3 else 1e4 * (s - 0.3),
+        lambda s: np.inf if s > 0.02 else 1e8 * s**2,
+    ],
+)
+def test_strength_reaches_the_wanted_misfit(misfit_at: object) -> None:
+    strength = strength_for(900.0, misfit_at)  # type: ignore[arg-type]
+    assert strength is not None
+    assert 900 / 1.3 < misfit_at(strength) < 900 * 1.3  # type: ignore[operator]
+
+
+def test_no_strength_where_even_the_strongest_cannot_be_seen_or_the_weakest_is_too_much() -> None:
+    assert strength_for(900.0, lambda s: 10.0 * s) is None
+    assert strength_for(900.0, lambda s: 1e9 + s) is None
+    assert WEAKEST < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("name", "coefficient"),
+    [
+        ("heave_pitch_rate_coupling", "c_wq"),
+        ("munk_moment", "c_qw"),
+        ("net_buoyancy", "w0"),
+        ("trim_moment", "q0"),
+        ("vertical_current", "current"),
+    ],
+)
+def test_claimed_coefficients_give_the_plants_own_run(name: str, coefficient: str) -> None:
+    rng = np.random.default_rng(3)
+    vehicle = draw_vehicle(rng)
+    outing = with_amplitude(draw_outing(rng, vehicle, near_surface=False), 0.02)
+    scenario = replace(outing.scenario, duration_s=30.0)
+    setting = Setting(vehicle=vehicle, command=0.1, pitch=0.1, duration_s=30.0, step_s=scenario.step_s)
+    effect = replace(draw_hidden(rng, name, setting), strength=0.02)
+    truth = sail(scenario, 1, (effect,), setting)
+    (value,) = true_coefficients(effect, setting, (0.0, 1.0)).values()
+    start = scenario.start
+    known = [*vehicle.coefficients.values(), start.heave, start.pitch_rate, start.pitch, start.depth]
+    more = [value if name == coefficient else 0.0 for name in MORE]
+    _, depth = free_run(np.array([[*known, *more]]), truth.command, 1 / outing.rate_hz, None)
+    _, without = free_run(np.array([[*known, *np.zeros(5)]]), truth.command, 1 / outing.rate_hz, None)
+    change = np.abs(truth.depth - without[0]).max()
+    assert np.abs(depth[0] - truth.depth).max() < 0.02 * change  # buoyancy acts along cos(pitch)
+
+
+@pytest.mark.parametrize("name", [*KINDS, *STRANGERS])
+def test_claimed_coefficients_have_names_of_the_catalogue(name: str) -> None:
+    rng = np.random.default_rng(3)
+    setting = Setting(vehicle=draw_vehicle(rng), command=0.1, pitch=0.1, duration_s=60.0, step_s=0.02)
+    claimed = true_coefficients(draw_hidden(rng, name, setting), setting, (0.6, 0.8))
+    if name in STRANGERS:
+        assert not claimed
+    else:
+        assert set(claimed) <= {parameter.name for parameter in BY_NAME[name].parameters}
+        assert claimed or name in ("speed_loss", "surface_waves", "rudder_stall")
+
+
+def test_a_stall_that_reaches_its_floor_has_no_coefficients_in_the_catalogues_form() -> None:
+    rng = np.random.default_rng(3)
+    setting = Setting(vehicle=draw_vehicle(rng), command=0.3, pitch=0.1, duration_s=60.0, step_s=0.02)
+    stall = draw_hidden(rng, "rudder_stall", setting)
+    assert not true_coefficients(replace(stall, strength=0.99), setting, (0.0, 1.0))
+    assert true_coefficients(replace(stall, strength=0.5), setting, (0.0, 1.0))["stall_loss"] == 1.5
