@@ -89,6 +89,15 @@ def test_held_out_error_over_the_noise() -> None:
     assert found.base_over_floor == pytest.approx(5.0)
 
 
+def test_held_out_error_over_the_true_structure() -> None:
+    true = {"depth_rmse_m": 0.1, "pitch_rmse_rad": 0.01}
+    said = diagnosis(effect("net_buoyancy"))
+    wrong = judge(answer(), recorded(), said, true_heldout=true)
+    assert wrong.over_truth == pytest.approx(((1.02**2 + 1.01**2) / 2) ** 0.5)
+    assert judge(answer(), recorded(), said).over_truth is None
+    assert judged(answer(), effect("trim_moment")).over_truth == 1.0
+
+
 def test_held_out_noise_is_that_of_the_spans_where_they_are_told() -> None:
     told = diagnosis(effect("trim_moment"))
     told["extended"]["heldout"]["spans_s"] = [[0.4, 0.6]]

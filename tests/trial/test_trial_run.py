@@ -7,7 +7,7 @@ import pytest
 from hand_made import answer
 
 from tools.trial.answers import SEAL, SEALED, BrokenSeal, open_answers, published, seal
-from tools.trial.run import diagnose_all, read_diagnosis, read_model
+from tools.trial.run import diagnose_all, read_result
 
 STUB = """
 import pathlib, sys
@@ -59,6 +59,5 @@ def test_answers_are_kept_and_failures_are_tried_again(tmp_path: Path, stub: tup
     assert not runs["bad"].has_answered
     assert (tmp_path / "diagnoses" / "bad" / "calls").read_text() == "xx"
     assert (tmp_path / "diagnoses" / "good" / "calls").read_text() == "x"
-    assert read_diagnosis(tmp_path, "good") == {"verdict": "unexplained"}
-    assert read_diagnosis(tmp_path, "bad") is None
-    assert read_model(tmp_path, "good") is None
+    assert read_result(tmp_path, "good", "diagnosis.json") == {"verdict": "unexplained"}
+    assert read_result(tmp_path, "bad", "diagnosis.json") is None

@@ -25,12 +25,12 @@ def run(args: argparse.Namespace) -> int:
 
     from tools.paper.stages import stages
     from tools.trial.answers import SEALED, BrokenSeal, open_answers, published
-    from tools.trial.judge import judge
+    from tools.trial.judge import judge, names_just
     from tools.trial.page import print_score, write_json, write_page
     from tools.trial.recorded import read_recorded
-    from tools.trial.run import diagnose_all, read_diagnosis, read_model
+    from tools.trial.run import TRUE_FILE, diagnose_all, fit_true_structures, read_result
     from tools.trial.score import score
-    from tools.trial.writing import RECORDINGS, recordings, write_trial
+    from tools.trial.writing import recordings, write_trial
 
     folder: Path = args.out
     if args.count < 1 or args.jobs < 1:
@@ -52,16 +52,32 @@ def run(args: argparse.Namespace) -> int:
         print(f"mils: {error}", file=sys.stderr)
         return 2
     print(f"answers opened, the seal is whole; seed {seed}")
+    said = {
+        answer.name: read_result(folder, answer.name, "diagnosis.json")
+        for answer in answers
+        if runs[answer.name].has_answered
+    }
+    beside = {
+        path: answer.hidden
+        for path, answer in zip(paths, answers, strict=True)
+        if answer.case != "outside" and not names_just(said.get(answer.name), answer.hidden)
+    }
+    with (
+        stages(args.quiet) as stage,
+        stage("fitting what was hidden, where something else was named", len(beside)) as step,
+    ):
+        fit_true_structures(folder, beside, args.jobs, step)
     judged = [
         judge(
             answer,
-            read_recorded(folder / RECORDINGS / f"{answer.name}.csv"),
-            read_diagnosis(folder, answer.name) if runs[answer.name].has_answered else None,
-            read_model(folder, answer.name),
-            runs[answer.name].seconds,
-            runs[answer.name].memory_mb,
+            read_recorded(path),
+            said.get(answer.name),
+            model=read_result(folder, answer.name, "extended_model.json"),
+            true_heldout=read_result(folder, answer.name, TRUE_FILE),
+            seconds=runs[answer.name].seconds,
+            memory_mb=runs[answer.name].memory_mb,
         )
-        for answer in answers
+        for path, answer in zip(paths, answers, strict=True)
     ]
     result = score(judged)
     print_score(result, Console(width=None if sys.stdout.isatty() else 110))

@@ -45,6 +45,7 @@ class Judged:
     is_exact      all that is hidden was named and nothing else
     admits        the verdict says that something stays unexplained
     over_floor    held-out free-run error over the noise that no model can foresee; `base_over_floor` before
+    over_truth    the same over what the true structure reaches in the same spans
     """
 
     recording: str
@@ -63,6 +64,7 @@ class Judged:
     admits: bool = False
     over_floor: float | None = None
     base_over_floor: float | None = None
+    over_truth: float | None = None
     effect_coefficients: list[Coefficient] = field(default_factory=list)
     base_coefficients: list[Coefficient] = field(default_factory=list)
     seconds: float = 0.0
@@ -79,18 +81,25 @@ class Judged:
         return min(self.misfits.values(), default=0.0)
 
 
+def names_just(diagnosis: dict[str, Any] | None, hidden: list[str]) -> bool:
+    """Whether a diagnosis names all that is hidden and nothing else."""
+    return diagnosis is not None and {effect["name"] for effect in diagnosis["effects"]} == set(hidden)
+
+
 def judge(
     answer: Answer,
     recorded: dict[str, Any],
     diagnosis: dict[str, Any] | None,
     model: dict[str, Any] | None = None,
+    true_heldout: dict[str, Any] | None = None,
     seconds: float = 0.0,
     memory_mb: float = 0.0,
 ) -> Judged:
     """Compares one diagnosis.json with its answer.
 
-    recorded    columns of the recording: time_s, pitch_rad, depth_m as arrays, NaN where not measured
-    model       extended_model.json, for the deviations of the base coefficients
+    recorded      columns of the recording: time_s, pitch_rad, depth_m as arrays, NaN where not measured
+    model         extended_model.json, for the deviations of the base coefficients
+    true_heldout  held-out errors of a fit that was told what is hidden; not needed where just that was named
     """
     effects = [] if diagnosis is None else diagnosis["effects"]
     named = [effect["name"] for effect in effects]
@@ -98,7 +107,7 @@ def judge(
     stated = {name: members for name, members in classes.items() if len(members) <= LARGEST_CLASS}
     hidden, first = set(answer.hidden), named[0] if named else NOTHING
     is_known = answer.case in ("one", "two")
-    is_exact = set(named) == hidden and answer.case != "outside"
+    is_exact = names_just(diagnosis, answer.hidden) and answer.case != "outside"
     verdict = "failed" if diagnosis is None else str(diagnosis["verdict"])
     slots = {} if diagnosis is None else diagnosis["location"]["slots"]
     reached = named + [name for members in stated.values() for name in members]
@@ -119,6 +128,7 @@ def judge(
         admits=verdict in ("partly_explained", "unexplained"),
         over_floor=_over_floor(answer, recorded, diagnosis, "extended"),
         base_over_floor=_over_floor(answer, recorded, diagnosis, "base"),
+        over_truth=1.0 if is_exact else _over_truth(diagnosis, true_heldout),
         effect_coefficients=_effect_coefficients(answer, effects) if is_exact else [],
         base_coefficients=_base_coefficients(answer, model) if is_exact else [],
         seconds=seconds,
@@ -157,6 +167,16 @@ def _over_floor(
             return None
         shares.append(heldout[key] ** 2 / float(np.nanmean(off**2)))
     return sqrt(sum(shares) / 2)
+
+
+def _over_truth(diagnosis: dict[str, Any] | None, true: dict[str, Any] | None) -> float | None:
+    if diagnosis is None or true is None:
+        return None
+    found = diagnosis["extended"]["heldout"]
+    channels = [(found[key], true[key]) for key in ("pitch_rmse_rad", "depth_rmse_m")]
+    if any(error is None or reached is None for error, reached in channels):
+        return None
+    return sqrt(sum((error / reached) ** 2 for error, reached in channels) / 2)
 
 
 def _effect_coefficients(answer: Answer, effects: list[dict[str, Any]]) -> list[Coefficient]:

@@ -10,10 +10,12 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).parent.parent.parent
 DIAGNOSES = "diagnoses"
 RUN_FILE = "run.json"
+TRUE_FILE = "true_structure.json"
 MOST_SECONDS = 1800.0
 
 
@@ -55,16 +57,37 @@ def diagnose_all(
     return runs
 
 
-def read_diagnosis(folder: Path, name: str) -> dict[str, object] | None:
-    """diagnosis.json of a recording, or None where the command left none."""
-    path = folder / DIAGNOSES / name / "diagnosis.json"
-    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+def fit_true_structures(
+    folder: Path, hidden: dict[Path, list[str]], jobs: int, on_done: Callable[[], None]
+) -> None:
+    """Fits each recording with the effects that it hides; those fitted before are kept."""
+    with ThreadPoolExecutor(jobs) as pool:
+        waiting = [pool.submit(_fit_true, folder, path, names) for path, names in hidden.items()]
+        for done in as_completed(waiting):
+            done.result()
+            on_done()
 
 
-def read_model(folder: Path, name: str) -> dict[str, object] | None:
-    """extended_model.json of a recording, or None where the command left none."""
-    path = folder / DIAGNOSES / name / "extended_model.json"
-    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+def read_result(folder: Path, name: str, file: str) -> dict[str, Any] | None:
+    """A JSON file of a recording's diagnosis, or None where there is none."""
+    path = folder / DIAGNOSES / name / file
+    if not path.is_file():
+        return None
+    content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return content
+
+
+def _environment() -> dict[str, str]:
+    paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return os.environ | {"OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(paths)}
+
+
+def _fit_true(folder: Path, recording: Path, names: list[str]) -> None:
+    out = folder / DIAGNOSES / recording.stem / TRUE_FILE
+    if not out.is_file():
+        told = ["--effects", ",".join(names), "--out", str(out)]
+        command = [sys.executable, "-m", "tools.true_structure", str(recording), *told]
+        subprocess.run(command, env=_environment(), capture_output=True, timeout=MOST_SECONDS, check=False)
 
 
 def _diagnose(recording: Path, out: Path, command: tuple[str, ...]) -> Run:
@@ -75,8 +98,6 @@ def _diagnose(recording: Path, out: Path, command: tuple[str, ...]) -> Run:
             return kept
     out.mkdir(parents=True, exist_ok=True)
     command = command or (sys.executable, "-m", "tools.cli", "diagnose")
-    paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
-    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(paths)}
     spoken = out / "said.txt"
     began = time.monotonic()
     with spoken.open("w", encoding="utf-8") as voice:
@@ -84,7 +105,7 @@ def _diagnose(recording: Path, out: Path, command: tuple[str, ...]) -> Run:
             [*command, str(recording), "--out", str(out), "--quiet"],
             stdout=voice,
             stderr=subprocess.STDOUT,
-            env=environment,
+            env=_environment(),
         )
         limit = threading.Timer(MOST_SECONDS, process.kill)
         limit.start()

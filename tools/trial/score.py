@@ -70,6 +70,7 @@ def score(judged: list[Judged]) -> Score:
     effect = [c for j in judged for c in j.effect_coefficients]
     base = [c for j in judged for c in j.base_coefficients]
     exact = [j for j in judged if j.is_exact and j.over_floor is not None]
+    told = [j for j in judged if j.over_truth is not None]
     known = [j for j in judged if j.case != "outside" and j.over_floor is not None]
     rates = [
         _rate("one hidden: named first", one, lambda j: bool(j.is_first), least=0.92),
@@ -84,6 +85,7 @@ def score(judged: list[Judged]) -> Score:
         _rate("outside physics: slot located right", outside, lambda j: bool(j.is_slot_right)),
         _rate("slot located right", [*one, *two], lambda j: bool(j.is_slot_right), 0.97),
         _rate("abstention: something hidden, nothing named", [*one, *two], lambda j: not j.named),
+        _rate("held-out error <= 1.05 x true structure", told, lambda j: _within(j.over_truth, 1.05), 0.90),
         _rate("held-out error <= 1.05 x noise", known, lambda j: _within(j.over_floor, 1.05)),
         _rate("held-out error <= 1.05 x noise, rightly named", exact, lambda j: _within(j.over_floor, 1.05)),
         _rate("95 % intervals of effects hold the truth", effect, lambda c: c.is_covered, 0.93, 0.97),
