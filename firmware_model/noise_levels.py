@@ -29,6 +29,15 @@ class SensorNoise:
     def reset(self) -> None:
         self.variance = self._first
         self.samples = 0.0
+        self.save()
+
+    def save(self) -> None:
+        """Remembers the level for `rollback`."""
+        self._good = (self.variance, self.samples)
+
+    def rollback(self) -> None:
+        """The level as at the last `save`."""
+        self.variance, self.samples = self._good
 
     def learn(self, innovation_variance: float, squared: float) -> None:
         """squared  nu = e^2/S"""
@@ -73,6 +82,15 @@ class ForceNoise:
         """Keeps the level, and begins a new stretch of time."""
         self._past = 0.0
         self._alike = 0.0
+        self.save()
+
+    def save(self) -> None:
+        """Remembers the level for `rollback`."""
+        self._good = (self.density, self._past, self._alike)
+
+    def rollback(self) -> None:
+        """The level as at the last `save`."""
+        self.density, self._past, self._alike = self._good
 
     def learn(self, innovation: float) -> None:
         """innovation  normalised to a variance of 1"""

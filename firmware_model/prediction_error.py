@@ -71,6 +71,11 @@ class Sensor:
         self.is_started = False
         self.force.forget()
 
+    @property
+    def is_finite(self) -> bool:
+        """Whether its noise levels are numbers."""
+        return math.isfinite(self.noise.variance + self.noise.samples + self.force.density)
+
 
 class PredictionError:
     """The filter, without guards: see `RobustEstimator` for those."""
@@ -153,6 +158,26 @@ class PredictionError:
         self._product_variance = math.inf
         self._turn = 0
 
+    def save(self) -> None:
+        """Remembers everything for `rollback`."""
+        self.ud.save()
+        for sensor in (self.pitch, self.depth):
+            sensor.noise.save()
+            sensor.force.save()
+
+    def rollback(self) -> None:
+        """The last good estimate, with an empty window."""
+        self.ud.rollback()
+        self.window.clear()
+        for sensor in (self.pitch, self.depth):
+            sensor.noise.rollback()
+            sensor.force.rollback()
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether all numbers are finite."""
+        return self.ud.is_finite and self.pitch.is_finite and self.depth.is_finite
+
     def restart(self) -> None:
         """Forgets the states and keeps the parameters, as after a gap."""
         for entry in (W, Q, THETA, ZETA):
@@ -228,7 +253,8 @@ class PredictionError:
     def _wander(self, is_excited: bool) -> None:
         """Lets one parameter drift, each in its turn, as far as all would in one step; gamma goes with it.
 
-        None drifts while nothing can be learnt about it, nor beyond what was thought of it at first.
+        None drifts that is known exactly, nor while nothing can be learnt about it, nor beyond what was
+        thought of it at first.
         """
         ud = self.ud
         self._product_variance *= 1.0 + self._step / 40.0
@@ -237,15 +263,15 @@ class PredictionError:
         prior = self._std[entry] * self._std[entry]
         size = max(ud.x[entry] * ud.x[entry], 0.0025 * prior)
         known = ud.covariance(entry, entry)
-        if not is_excited or known >= min(prior, 0.04 * size):
+        if not is_excited or known == 0.0 or known >= min(prior, 0.04 * size):
             return
         row = self._row
         for j in range(COUNT):
             row[j] = 0.0
         row[entry] = 1.0
         if entry == A1:
-            row[GAMMA] = ud.x[KAPPA]
-        if entry == KAPPA:
+            row[GAMMA] = ud.x[GAMMA] / ud.x[A1]
+        if entry == KAPPA and not self.has_coupling:
             row[GAMMA] = ud.x[A1]
         ud.add(row, self._drift * size * self._step * len(WANDERING))
 

@@ -27,6 +27,8 @@ MOTION_OVER_NOISE = 2.0
 MOST_RESTARTS, RESTART_REGAIN_S = 5, 60.0
 SPEED_SPREAD_S = 60.0
 """Averaging time of the measured speed and its spread, as they are reported."""
+HIGHEST_SPEED = 50.0
+"""m/s; what is said to be more is no speed."""
 
 
 class RobustEstimator:
@@ -72,9 +74,9 @@ class RobustEstimator:
         refusal = self._grid.check(sample.t_us)
         if refusal is not None:
             return refusal
-        self._filter.ud.save()
+        self._filter.save()
         status = self._follow(sample, self._grid.missed)
-        if not self._filter.ud.is_finite:
+        if not self._filter.is_finite:
             self._recover()
             return Status.FAULT_NUMERICAL
         self._faults = 0
@@ -86,8 +88,7 @@ class RobustEstimator:
 
     def _recover(self) -> None:
         """Back to the last good estimate; after faults in a row the states start anew, or all stops."""
-        self._filter.ud.rollback()
-        self._filter.window.clear()
+        self._filter.rollback()
         self._faults += 1
         if self._faults >= self.config.outlier_limit:
             self._faults = 0
@@ -124,7 +125,7 @@ class RobustEstimator:
 
     def _take_speed(self, speed: float) -> None:
         """The median of the last three measured speeds is the speed: one wrong value does nothing."""
-        if math.isnan(speed):
+        if not abs(speed) <= HIGHEST_SPEED:
             return
         self._speed.update(speed)
         recent = self._speeds
@@ -199,6 +200,8 @@ class RobustEstimator:
             std = math.sqrt(ud.covariance(entry, entry))
             self._validity.check(name, ud.x[entry], std, is_possible and self._tally.updates > 0)
         u0, std = self._u0
+        if own.is_speed_known:
+            std = 0.0  # it varies, but it is known
         self._validity.check("u0", u0, std, own.is_speed_known or heave_is_possible)
         # A coupling may well be zero: it is known when it is known to a small part of the speed.
         c_wq, std = own.coupling

@@ -109,9 +109,9 @@ class UdFactors:
         """P <- P + variance w w^T; w (n) is used up."""
         for j in range(self.n):
             p = w[j]
-            if p == 0.0:
-                continue
             grown = self.D[j] + variance * p * p
+            if p == 0.0 or not grown > 0.0:
+                continue
             ratio = p * variance / grown
             variance *= self.D[j] / grown
             self.D[j] = grown

@@ -125,7 +125,7 @@ CASES: dict[str, Case] = {
     "60 % lost at random": Case(missing=0.6),
     "60 % lost in bursts of 2 s": Case(missing=0.6, burst=2.0),
     "offsets of sensors and trim": Case(offsets=(0.03, 0.2)),
-    "measured speed": Case(tells_speed=True),
+    "measured speed, c_wq estimated": Case(tells_speed=True),
     DRIFTING: Case(duration=600.0, drift=(1.3, 0.8, 0.7, 1.25, 0.8)),
 }
 """The first is the case in which all methods are compared; the live estimator flies them all, the last

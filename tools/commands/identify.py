@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--method",
         choices=("car", "mils", "robust", "ml"),
         default="ml",
-        help="ml: maximum likelihood (default); robust: as `mils run` learns; mils, car: the paper's regression",
+        help="ml: maximum likelihood (default); robust: as on the vehicle; mils, car: the paper's regression",
     )
     parser.add_argument(
         "--each", action="store_true", help="one model for each recording instead of one for all"
