@@ -18,11 +18,11 @@ class RobustConfig:
     """Settings of `RobustEstimator`. Raises ValueError naming the first value that breaks its rule.
 
     The prior is that of a vehicle whose pitch answers within about `pitch_time` and which moves at about the
-    configured speed; it is weak, and a factor of three either way does no harm.
+    configured speed; it is weak, and a factor of two either way does no harm.
     """
 
     innovation_length: int = 1  # p, steps in which each sample is used, 1 to 64; more only costs time
-    pitch_time: float = 1.0  # s, above 0: time in which pitch answers the plane, roughly
+    pitch_time: float | None = None  # s, above 0: in which pitch answers the plane; None: 1 s, or 5 steps
     typical_rudder: float = 0.25  # rad (or the rudder's own unit), above 0: a large movement of it
     # Highest noise to expect of the sensors, standard deviation: the level itself is learnt. Too low a value
     # makes the first estimates too sure of themselves, a value three times too high costs nothing.
@@ -36,13 +36,14 @@ class RobustConfig:
     heave_pitch_rate_coupling: bool | None = None
     drift: float = 0.0  # 0 or more: relative change of a parameter to be followed, in 100 s
     rudder_hold: float = 1.0  # s, 0 or more: how long a rudder that is not measured is taken as held
-    rest_time: float = 30.0  # s, above 0: without excitation for so long, the vehicle is at rest
+    rest_time: float | None = None  # s, above 0: so long without excitation is rest; None: 30 pitch times
 
     def __post_init__(self) -> None:
         _require_innovation_length(self.innovation_length)
         for name in ("pitch_time", "typical_rudder", "pitch_noise", "depth_noise", "rest_time"):
             value = getattr(self, name)
-            require(0.0 < value < math.inf, f"{name} must be above 0 and finite", value)
+            is_positive = value is None or 0.0 < value < math.inf
+            require(is_positive, f"{name} must be above 0 and finite", value)
         for name in ("drift", "rudder_hold"):
             value = getattr(self, name)
             require(0.0 <= value < math.inf, f"{name} must be 0 or more and finite", value)
@@ -95,6 +96,18 @@ class EstimatorConfig:
     invalid_above: float = 0.2  # and stops being valid above this one
     robust: RobustConfig = RobustConfig()
     mils: MilsConfig = MilsConfig()
+
+    @property
+    def pitch_time(self) -> float:
+        """Time in which pitch answers the plane, roughly, s."""
+        own = self.robust.pitch_time
+        return max(1.0, 5.0 * self.step) if own is None else own
+
+    @property
+    def rest_time(self) -> float:
+        """Time without excitation after which the vehicle is at rest, s."""
+        own = self.robust.rest_time
+        return 30.0 * self.pitch_time if own is None else own
 
     def __post_init__(self) -> None:
         for name in (

@@ -7,6 +7,8 @@ LIKELY = 9.0
 LIKELY_MEAN = 0.9974
 """Mean of min(chi-squared of one degree, LIKELY)."""
 
+LOWEST = 2.5e-5
+"""Share of the first level of a force below which it does not sink."""
 EARLY = 5.0
 """Samples that the configured level counts for."""
 
@@ -66,7 +68,7 @@ class ForceNoise:
     def __init__(self, step: float, *, first: float, highest: float, target: float, time: float) -> None:
         self._first = first
         self._highest = highest
-        self._lowest = 5e-8 * highest
+        self._lowest = LOWEST * first
         self._target = target
         self._fade = math.exp(-step / time)
         self._keep = math.sqrt(1.0 - self._fade * self._fade)

@@ -53,6 +53,8 @@ EXACT = 1e-12
 """Variance of what is known exactly."""
 CORRELATION = 0.02
 """Mean correlation of innovations that counts as white; a little above zero: forces must not fade out."""
+HIGHEST_FORCE = 2000.0
+"""Density of unknown forces over that at the start, to which it may rise."""
 WANDERING = (A1, A2, A3, B1, B2, KAPPA, HEAVE_TRIM, PITCH_TRIM)
 
 
@@ -85,7 +87,7 @@ class PredictionError:
         self._step = config.step
         self._coupling = own.heave_pitch_rate_coupling
         self._configured_speed = config.speed
-        T, speed, plane = own.pitch_time, config.speed, 0.25 / own.typical_rudder
+        T, speed, plane = config.pitch_time, config.speed, 0.25 / own.typical_rudder
         speed_std = 0.5 * speed if own.speed_std is None else own.speed_std
         self._coupling_std = 0.5 * speed
         self._mean = [0.0] * COUNT
@@ -114,9 +116,9 @@ class PredictionError:
         self.window = InnovationWindow(own.innovation_length)
         self.ud = UdFactors(COUNT, PATTERN, driven=(0, 1))
 
-        def force(highest: float) -> ForceNoise:
+        def force(first: float) -> ForceNoise:
             # Small at first: what is not known yet adds its own noise, and true forces soon raise the level.
-            first = 0.002 * highest
+            highest = HIGHEST_FORCE * first
             return ForceNoise(config.step, first=first, highest=highest, target=CORRELATION, time=0.5 * T)
 
         def noise(std: float, resolution: float) -> SensorNoise:
@@ -125,13 +127,13 @@ class PredictionError:
         self.pitch = Sensor(
             THETA,
             noise(own.pitch_noise, config.pitch_resolution),
-            force(0.02 * pitch),
+            force(4e-5 * pitch),
             config.pitch_resolution,
         )
         self.depth = Sensor(
             ZETA,
             noise(own.depth_noise, config.depth_resolution),
-            force(0.00125 * heave),
+            force(2.5e-6 * heave),
             config.depth_resolution,
         )
         self.reset()

@@ -108,7 +108,7 @@ class RobustEstimator:
             missed = 0
         self._take_speed(sample.speed)
         is_excited = self._observe_motion(sample, missed + 1)
-        if self._is_frozen or self._rest > self.config.robust.rest_time:
+        if self._is_frozen or self._rest > self.config.rest_time:
             self._lose_states()
             return Status.FROZEN if self._is_frozen else Status.NOT_EXCITED
         is_new = math.isnan(self._rudder)

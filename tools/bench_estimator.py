@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_model import Mils, Status, car_from_physical
+from firmware_model import (
+    EstimatorConfig,
+    Mils,
+    MilsConfig,
+    RobustConfig,
+    Sample,
+    Status,
+    car_from_physical,
+    make_estimator,
+)
 
 Array = NDArray[np.float64]
 
@@ -48,6 +57,21 @@ def median_cost(n: int, p: int, real: Callable[[float], Any], steps: int) -> flo
     return statistics.median(times[p:]) * 1e-3
 
 
+def median_sample_cost(config: EstimatorConfig, steps: int) -> float:
+    """Median time in which an estimator takes one sample of a moving vehicle, microseconds."""
+    rng = np.random.default_rng(0)
+    estimator = make_estimator(config)
+    times = []
+    for k in range(steps):
+        rudder = 0.2 * float(np.sin(0.07 * k) + np.sin(0.19 * k))
+        depth, pitch = 20.0 + 0.01 * float(rng.normal()), -0.4 * rudder + 0.002 * float(rng.normal())
+        sample = Sample(t_us=100_000 * k, depth=depth, pitch=pitch, rudder=rudder)
+        start = time.perf_counter_ns()
+        estimator.update(sample)
+        times.append(time.perf_counter_ns() - start)
+    return statistics.median(times[steps // 4 :]) * 1e-3
+
+
 def textbook_life(rows: Array, p: int, forgetting: float, real: type, *, symmetric: bool) -> int:
     """Steps until P of the textbook update, or of its symmetrised form, is not positive definite."""
     n = rows.shape[1]
@@ -84,7 +108,14 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=3000, help="steps of each survival run (default 3000)")
     steps = parser.parse_args().steps
 
-    print("median cost of an update, microseconds")
+    print("median cost of a sample, microseconds")
+    for p in (1, 5):
+        robust = EstimatorConfig(step=0.1, speed=2.0, robust=RobustConfig(innovation_length=p))
+        mils = EstimatorConfig(method="mils", step=0.1, speed=2.0, mils=MilsConfig(innovation_length=p))
+        costs = (median_sample_cost(robust, 2000), median_sample_cost(mils, 2000))
+        print(f"    p = {p}   robust {costs[0]:7.1f}   mils {costs[1]:7.1f}")
+
+    print("\nmedian cost of a MILS step, microseconds")
     print("    n   p   float64   float32")
     for n in (3, 7):
         for p in (1, 5, 8):

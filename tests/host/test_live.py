@@ -350,3 +350,22 @@ def test_the_state_is_saved_and_the_journal_synced_on_the_way(tmp_path: Path) ->
     run = Run(tmp_path, one_instant_a_read(dive(600)), watch=watch, state={"period": 5.0})
     run.run()
     assert len(set(seen)) >= 10
+
+
+def test_the_noise_proof_estimator_is_what_runs_by_default(tmp_path: Path) -> None:
+    run = Run(tmp_path, one_instant_a_read(dive(600)), estimator={})
+    end = run.run()
+    assert run.vehicle.estimator.method == "robust"
+    assert end.samples == {"UPDATED": 600}
+    published = run.sources[0].published[-1][1]
+    # Euler's steps are not those of a held plane: a third is all that can be asked of these data.
+    assert published["a3"] == pytest.approx(TABLE_1["a3"], rel=0.3)
+    assert published["u0"] == pytest.approx(U0, rel=0.1)
+    assert published["u0_std"] > 0.0
+
+
+def test_a_state_of_the_other_method_is_kept_aside_and_said(tmp_path: Path) -> None:
+    Run(tmp_path, one_instant_a_read(dive(300))).run()
+    run = Run(tmp_path, one_instant_a_read(dive(3)), estimator={"method": "robust"})
+    assert run.run().estimate.updates <= 3
+    assert any("another configuration" in sentence for sentence in run.said)

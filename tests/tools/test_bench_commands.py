@@ -100,6 +100,16 @@ def test_regression_methods_say_that_noise_biases_them(
     assert (tmp_path / "report.html").exists()
 
 
+def test_the_live_estimator_over_a_recording_agrees_with_the_bench(
+    recording: Path, tmp_path: Path, model: Path
+) -> None:
+    assert main(["identify", str(recording), "--method", "robust", "--out", str(tmp_path), "--quiet"]) == 0
+    live, bench = (json.loads((p / "model.json").read_text())["parameters"] for p in (tmp_path, model.parent))
+    for name in ("a2", "a3", "b2", "u0"):
+        spread = live[name]["std"] + bench[name]["std"]
+        assert abs(live[name]["value"] - bench[name]["value"]) < 4.0 * spread, name
+
+
 def test_a_plane_that_never_moved_ends_with_no(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     still = dive(tmp_path / "still.csv", amplitude=0.0)
     assert main(["identify", str(still), "--out", str(tmp_path), "--quiet"]) == 1

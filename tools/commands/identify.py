@@ -54,6 +54,9 @@ def run(args: argparse.Namespace) -> int:
                     if std
                     else f"  {name:13s} {value:+10.5f} {unit}"
                 )
+            for effect in result.model.effects:
+                for name, entry in effect["parameters"].items():
+                    print(f"  {name:13s} {entry['value']:+10.5f} +- {entry['std']:.5f} {entry['unit']}")
             for line in advice(result):
                 print(f"  to learn {line}")
             for note in (*result.notes, *_reading_notes(recordings)):
