@@ -22,7 +22,7 @@ class RobustConfig:
     """
 
     innovation_length: int = 1  # p, steps in which each sample is used, 1 to 64; more only costs time
-    pitch_time: float | None = None  # s, above 0: in which pitch answers the plane; None: 1 s, or 5 steps
+    pitch_time: float | None = None  # s, above 0: in which pitch answers the plane; None: 1 s, or a step
     typical_rudder: float = 0.25  # rad (or the rudder's own unit), above 0: a large movement of it
     # Highest noise to expect of the sensors, standard deviation: the level itself is learnt. Too low a value
     # makes the first estimates too sure of themselves, a value three times too high costs nothing.
@@ -35,7 +35,7 @@ class RobustConfig:
     # measured. Without a measured speed it makes u0 and b1 several times less certain.
     heave_pitch_rate_coupling: bool | None = None
     drift: float = 0.0  # 0 or more: relative change of a parameter to be followed, in 100 s
-    rudder_hold: float = 1.0  # s, 0 or more: how long a rudder that is not measured is taken as held
+    rudder_hold: float = 2.5  # s, 0 or more: longest time without a rudder that is bridged
     rest_time: float | None = None  # s, above 0: so long without excitation is rest; None: 30 pitch times
 
     def __post_init__(self) -> None:
@@ -101,7 +101,7 @@ class EstimatorConfig:
     def pitch_time(self) -> float:
         """Time in which pitch answers the plane, roughly, s."""
         own = self.robust.pitch_time
-        return max(1.0, 5.0 * self.step) if own is None else own
+        return max(1.0, self.step) if own is None else own
 
     @property
     def rest_time(self) -> float:

@@ -237,15 +237,17 @@ class PredictionError:
             ud.observe_entry(KAPPA, -ud.x[KAPPA], EXACT)
         self.restart()
 
-    def predict(self, rudder: float, is_excited: bool) -> None:
-        """Moves one step on, the rudder held."""
+    def predict(self, rudder: float, is_excited: bool, doubt: float = 0.0) -> None:
+        """Moves one step on, the rudder held; `doubt` is the density of a white error in it, rad^2 s."""
         ud, moments, noise = self.ud, self._moments, self._noise
+        heave_doubt = doubt * (ud.x[B1] * ud.x[B1] + ud.covariance(B1, B1)) if doubt > 0.0 else 0.0
+        pitch_doubt = doubt * (ud.x[B2] * ud.x[B2] + ud.covariance(B2, B2)) if doubt > 0.0 else 0.0
         for _ in range(self._substeps):
             moments.update(ud)
             heave = min(self._annealing[0] * moments.heave_variance, self._most[0])
             pitch = min(self._annealing[1] * moments.pitch_variance, self._most[1])
-            noise[0] = self._interval * (heave + self.depth.force.density)
-            noise[1] = self._interval * (pitch + self.pitch.force.density)
+            noise[0] = self._interval * (heave + self.depth.force.density + heave_doubt)
+            noise[1] = self._interval * (pitch + self.pitch.force.density + pitch_doubt)
             self._propagation.advance(ud.x, rudder, self.speed, moments.heave_mean, moments.pitch_mean)
             ud.move(self._propagation.F, noise)
             self.window.carry(self._propagation.F, noise)

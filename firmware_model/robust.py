@@ -35,9 +35,9 @@ class RobustEstimator:
     """Estimates a1, a2, a3, b1, b2 and u0 from depth, pitch and stern plane while they come in.
 
     Any value of a sample may be NaN, and samples may be missing: what was measured is used. A rudder that is
-    not measured is taken as held for `rudder_hold` s; after a longer gap the states of the vehicle start anew
-    and the parameters are kept. A measured speed is taken as it comes (the median of the last three), and
-    held.
+    not measured is taken as held; if it comes back another, it turned once on the way, nobody knows when.
+    Without it for more than `rudder_hold` s the states of the vehicle start anew and the parameters are kept.
+    A measured speed is taken as it comes (the median of the last three), and held.
     """
 
     def __init__(self, config: EstimatorConfig) -> None:
@@ -74,6 +74,9 @@ class RobustEstimator:
         refusal = self._grid.check(sample.t_us)
         if refusal is not None:
             return refusal
+        if math.isnan(sample.depth) and math.isnan(sample.pitch) and math.isnan(sample.rudder):
+            self._tally.samples += 1  # as good as missing: what it lacks is bridged with the next one
+            return Status.WAITING
         self._filter.save()
         status = self._follow(sample, self._grid.missed)
         if not self._filter.is_finite:
@@ -117,11 +120,28 @@ class RobustEstimator:
                 return Status.WAITING
             self._filter.restart()
         else:
-            for _ in range(missed + 1):
-                self._filter.predict(self._rudder, is_excited)
+            self._bridge(sample.rudder, missed + 1, is_excited)
         status = self._learn(sample)
         self._hold_rudder(sample.rudder, missed + 1)
         return Status.RESTARTED if is_new and status is Status.UPDATED and self._tally.updates > 1 else status
+
+    def _bridge(self, rudder: float, instants: int, is_excited: bool) -> None:
+        """Predicts to this sample, whose rudder is known at both ends of the way, or only at its beginning.
+
+        If it turned by `change` at one of n instants, each as likely, it has turned at instant j with the
+        chance p = j/n: its mean is on a straight line, and its error has the variance p (1 - p) change^2 and
+        lasts for n step/2, so that the moment it gives has the variance of the time at which the rudder
+        turned.
+        """
+        change = 0.0 if math.isnan(rudder) else rudder - self._rudder
+        step = self.config.step
+        # Instants that went by while the rudder was taken as held: the error they left is added at once.
+        doubt = change * change * step * self._held * self._held / 3.0
+        for j in range(instants):
+            p = j / instants
+            doubt += p * (1.0 - p) * change * change * instants * step / 2.0
+            self._filter.predict(self._rudder + p * change, is_excited, doubt)
+            doubt = 0.0
 
     def _take_speed(self, speed: float) -> None:
         """The median of the last three measured speeds is the speed: one wrong value does nothing."""

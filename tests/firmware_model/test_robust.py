@@ -190,6 +190,20 @@ def test_missing_samples_are_passed_over_with_the_rudder_held(trained):
         assert one == pytest.approx(other, rel=1e-9)
 
 
+@pytest.mark.parametrize("rudder_is_known", [True, False])
+def test_samples_lost_with_their_rudder_do_not_bias(rudder_is_known):
+    """Where the plane turned is then known to the length of a gap only."""
+    rng = np.random.default_rng(6)
+    estimator = RobustEstimator(CONFIG)
+    for sample in dive(3000, 6):
+        if rng.random() < 0.5:
+            continue
+        hidden = not rudder_is_known and rng.random() < 0.2
+        estimator.update(replace(sample, rudder=math.nan) if hidden else sample)
+    assert_found(estimator)
+    assert all(estimator.estimate().std[name] < 0.05 * abs(TRUTH[name]) for name in ("a2", "a3", "b2"))
+
+
 def test_values_missing_at_random_cost_precision_only():
     rng = np.random.default_rng(3)
     samples = dive(3000)
@@ -225,7 +239,7 @@ def test_a_long_gap_starts_the_states_anew_and_keeps_the_parameters(trained):
 
 
 def test_a_rudder_that_stays_away_ends_the_states(trained):
-    estimator = estimator_of(trained)
+    estimator = estimator_of(trained, with_robust(rudder_hold=1.0))
     samples = dive(400, first=1200)
     run(estimator, samples[:100])
     without = [replace(sample, rudder=math.nan) for sample in samples[100:130]]

@@ -79,7 +79,14 @@ def test_the_table_is_printed(capsys):
     assert said.count("diverged 12 of 12") == 3
 
 
-@pytest.mark.parametrize("arguments", [["--seeds", "1"], ["--workers", "0"]])
-def test_bad_usage_ends_with_2(arguments, capsys):
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--seeds", "1"], "--seeds must be at least 2"),
+        (["--workers", "0"], "--workers 1"),
+        (["--only", "nothing like it"], "--only must be part"),
+    ],
+)
+def test_bad_usage_ends_with_2(arguments, message, capsys):
     assert main(["bench-accuracy", *arguments]) == 2
-    assert "--seeds must be at least 2" in capsys.readouterr().err
+    assert message in capsys.readouterr().err

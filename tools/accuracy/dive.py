@@ -19,6 +19,7 @@ class Case:
     """What is flown and how it is measured; SI units.
 
     missing  share of the samples of each sensor that is lost, one by one, or in bursts of `burst` s of both
+    loses_rows  whether a sample is lost as a whole, the plane with it
     offsets  standard deviations over dives of the forces of trim: heave m/s^2, pitch rad/s^2
     drift    factors by which a1, a2, a3, b1, b2 change over the dive, linearly from 1
     coupling c_wq of w' = ... + c_wq q
@@ -31,6 +32,7 @@ class Case:
     depth_noise: float = 0.01
     missing: float = 0.0
     burst: float = 0.0
+    loses_rows: bool = False
     offsets: tuple[float, float] = (0.0, 0.0)
     drift: tuple[float, float, float, float, float] = (1.0, 1.0, 1.0, 1.0, 1.0)
     coupling: float = 0.0
@@ -145,10 +147,12 @@ def _lost(rng: np.random.Generator, case: Case, rows: int) -> NDArray[np.bool_]:
     if case.missing == 0.0:
         return np.zeros((2, rows), dtype=bool)
     if case.burst == 0.0:
-        return rng.random((2, rows)) < case.missing
+        lost = rng.random((2, rows)) < case.missing
+        return np.vstack([lost[:1], lost[:1]]) if case.loses_rows else lost
     length = max(1, round(case.burst / case.step))
     begins = case.missing / (1.0 - case.missing) / length
-    lost, k = np.zeros((2, rows), dtype=bool), 0
+    lost = np.zeros((2, rows), dtype=bool)
+    k = 0
     while k < rows:
         if rng.random() < begins:
             lost[:, k : k + length] = True

@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from firmware_model.config import EstimatorConfig, MilsConfig, RobustConfig
 from firmware_model.estimator import make_estimator
@@ -28,15 +29,16 @@ NOTHING = np.full(6, np.nan)
 def recording_of(dive: Dive) -> Recording:
     """The dive as a recording on the bench."""
     speed = dive.case.vehicle[5] if dive.case.tells_speed else np.nan
+    kept = _rows_of(dive)
     return Recording(
         name="dive",
         sha256="0" * 64,
-        time=dive.time,
-        depth=dive.depth,
-        pitch=dive.pitch,
-        rudder=dive.rudder,
-        speed=np.full_like(dive.time, speed),
-        pitch_rate=np.full_like(dive.time, np.nan),
+        time=dive.time[kept],
+        depth=dive.depth[kept],
+        pitch=dive.pitch[kept],
+        rudder=dive.rudder[kept],
+        speed=np.full(kept.size, speed),
+        pitch_rate=np.full(kept.size, np.nan),
         step=dive.case.step,
     )
 
@@ -46,11 +48,22 @@ def samples_of(dive: Dive) -> list[Sample]:
     step_us = round(dive.case.step * 1e6)
     speed = dive.case.vehicle[5] if dive.case.tells_speed else float("nan")
     return [
-        Sample(t_us=k * step_us, depth=depth, pitch=pitch, rudder=rudder, speed=speed)
-        for k, (depth, pitch, rudder) in enumerate(
-            zip(dive.depth.tolist(), dive.pitch.tolist(), dive.rudder.tolist(), strict=True)
+        Sample(
+            t_us=k * step_us,
+            depth=float(dive.depth[k]),
+            pitch=float(dive.pitch[k]),
+            rudder=float(dive.rudder[k]),
+            speed=speed,
         )
+        for k in _rows_of(dive).tolist()
     ]
+
+
+def _rows_of(dive: Dive) -> NDArray[np.int_]:
+    """The rows that there are."""
+    if dive.case.loses_rows:
+        return np.flatnonzero(np.isfinite(dive.pitch))
+    return np.arange(dive.time.size)
 
 
 def live(config: EstimatorConfig, dive: Dive) -> Answer:
@@ -124,6 +137,8 @@ CASES: dict[str, Case] = {
     "30 % lost at random": Case(missing=0.3),
     "60 % lost at random": Case(missing=0.6),
     "60 % lost in bursts of 2 s": Case(missing=0.6, burst=2.0),
+    "30 % of rows lost, the plane with them": Case(missing=0.3, loses_rows=True),
+    "60 % of rows lost, the plane with them": Case(missing=0.6, loses_rows=True),
     "offsets of sensors and trim": Case(offsets=(0.03, 0.2)),
     "measured speed, c_wq estimated": Case(tells_speed=True),
     DRIFTING: Case(duration=600.0, drift=(1.3, 0.8, 0.7, 1.25, 0.8)),

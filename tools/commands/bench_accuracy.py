@@ -12,6 +12,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--seeds", type=int, default=200, metavar="N", help="dives of each case (default 200)"
     )
     parser.add_argument("--quick", action="store_true", help="12 dives of the first case only")
+    parser.add_argument(
+        "--only", metavar="TEXT", default="", help="lines that hold this text, e.g. ml or 5 Hz"
+    )
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes at once")
     parser.add_argument("--quiet", action="store_true", help="no progress")
 
@@ -28,6 +31,9 @@ def run(args: argparse.Namespace) -> int:
     pairs = [(first, method) for method in COMPARED]
     if not args.quick:
         pairs += [(case, FOLLOWING if case == DRIFTING else LIVE) for case in others]
+    pairs = [pair for pair in pairs if args.only in " | ".join(pair)]
+    if not pairs:
+        raise ConfigError(f"--only must be part of the name of a case or a method (got {args.only!r})")
     with progress(args.quiet) as say:
         lines = measure(pairs, 12 if args.quick else args.seeds, args.workers, say)
     print(show(lines))
