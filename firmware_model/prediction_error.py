@@ -14,7 +14,8 @@ from typing import Any
 
 from firmware_model.config import EstimatorConfig
 from firmware_model.innovation_window import InnovationWindow
-from firmware_model.noise_levels import LIKELY, ForceNoise, SensorNoise
+from firmware_model.noise_levels import ForceNoise, SensorNoise
+from firmware_model.prior import Prior
 from firmware_model.propagation import (
     A1,
     A2,
@@ -34,13 +35,12 @@ from firmware_model.propagation import (
     W,
 )
 from firmware_model.second_order import SecondOrder
+from firmware_model.sensor import Sensor
 from firmware_model.state import finite_numbers, require
 from firmware_model.ud_factors import UdFactors
 
 SUBSTEP = 0.101
 """Longest interval of one propagation, in pitch times; the products' variance must not change much within."""
-HUBER = 5.0
-"""Standard deviations beyond which a sample's influence does not grow any more."""
 SENSOR_MEMORY = 1000.0
 """Samples over which a sensor's noise is averaged."""
 SELF_ANNEALING = (4.0, 1.0)
@@ -58,27 +58,6 @@ HIGHEST_FORCE = 2000.0
 WANDERING = (A1, A2, A3, B1, B2, KAPPA, HEAVE_TRIM, PITCH_TRIM)
 
 
-class Sensor:
-    """One measured entry of the state, its noise, and the unknown force that shows in it."""
-
-    def __init__(self, entry: int, noise: SensorNoise, force: ForceNoise, resolution: float) -> None:
-        self.entry = entry
-        self.noise = noise
-        self.force = force
-        self.resolution = resolution
-        self.restart()
-
-    def restart(self) -> None:
-        """The next value is the first."""
-        self.is_started = False
-        self.force.forget()
-
-    @property
-    def is_finite(self) -> bool:
-        """Whether its noise levels are numbers."""
-        return math.isfinite(self.noise.variance + self.noise.samples + self.force.density)
-
-
 class PredictionError:
     """The filter, without guards: see `RobustEstimator` for those."""
 
@@ -87,25 +66,9 @@ class PredictionError:
         self._step = config.step
         self._coupling = own.heave_pitch_rate_coupling
         self._configured_speed = config.speed
-        T, speed, plane = config.pitch_time, config.speed, 0.25 / own.typical_rudder
-        speed_std = 0.5 * speed if own.speed_std is None else own.speed_std
-        self._coupling_std = 0.5 * speed
-        self._mean = [0.0] * COUNT
-        self._mean[A1], self._mean[A2], self._mean[A3] = -1.0 / T, -3.0 / T, -5.0 / (T * T)
-        self._std = [0.0] * COUNT
-        self._std[A1], self._std[A2], self._std[A3] = 1.0 / T, 3.0 / T, 5.0 / (T * T)
-        self._std[B1], self._std[B2] = 0.5 * plane * speed / T, 5.0 * plane / (T * T)
-        self._std[KAPPA] = math.hypot(speed_std, self._coupling_std if self._coupling else 0.0)
-        self._std[GAMMA] = 1.5 * speed_std / T
-        self._std[HEAVE_TRIM], self._std[PITCH_TRIM] = 0.05 * speed / T, 0.3 / (T * T)
-        self._std[W], self._std[Q] = 0.25 * speed, 0.5 / T
-        self._std[THETA], self._std[ZETA] = 0.3, 2.5 * speed * T
-        self._lower = {A1: -20.0 / T, A2: -20.0 / T, A3: -200.0 / (T * T)}
-        self._upper = {A1: -0.02 / T, A2: -0.05 / T, A3: -0.05 / (T * T)}
+        self._prior = Prior(config)
+        T = config.pitch_time
         self._annealing = (SELF_ANNEALING[0] * T, SELF_ANNEALING[1] * T)
-        # Most that the second-order variance may add, as densities.
-        heave, pitch = speed * speed / T, 1.0 / (T * T * T)
-        self._most = (0.0125 * heave, 0.02 * pitch)
         self._drift = own.drift * own.drift / 100.0
         self._substeps = max(1, math.ceil(config.step / (SUBSTEP * T)))
         self._interval = config.step / self._substeps
@@ -116,26 +79,18 @@ class PredictionError:
         self.window = InnovationWindow(own.innovation_length)
         self.ud = UdFactors(COUNT, PATTERN, driven=(0, 1))
 
-        def force(first: float) -> ForceNoise:
-            # Small at first: what is not known yet adds its own noise, and true forces soon raise the level.
+        def sensor(entry: int, std: float, resolution: float, first: float) -> Sensor:
             highest = HIGHEST_FORCE * first
-            return ForceNoise(config.step, first=first, highest=highest, target=CORRELATION, time=0.5 * T)
+            return Sensor(
+                entry,
+                SensorNoise(std * std, resolution * resolution / 12.0, SENSOR_MEMORY),
+                ForceNoise(config.step, first=first, highest=highest, target=CORRELATION, time=0.5 * T),
+                resolution,
+            )
 
-        def noise(std: float, resolution: float) -> SensorNoise:
-            return SensorNoise(std * std, resolution * resolution / 12.0, SENSOR_MEMORY)
-
-        self.pitch = Sensor(
-            THETA,
-            noise(own.pitch_noise, config.pitch_resolution),
-            force(4e-5 * pitch),
-            config.pitch_resolution,
-        )
-        self.depth = Sensor(
-            ZETA,
-            noise(own.depth_noise, config.depth_resolution),
-            force(2.5e-6 * heave),
-            config.depth_resolution,
-        )
+        heave, pitch = self._prior.forces
+        self.pitch = sensor(THETA, own.pitch_noise, config.pitch_resolution, pitch)
+        self.depth = sensor(ZETA, own.depth_noise, config.depth_resolution, heave)
         self.reset()
 
     def reset(self) -> None:
@@ -146,15 +101,14 @@ class PredictionError:
         self.heave_is_at_bound = False
         self.pitch_is_at_bound = False
         for sensor in (self.pitch, self.depth):
-            sensor.noise.reset()
-            sensor.force.reset()
+            sensor.reset()
         self.restart()
 
     def _set_prior(self) -> None:
         ud = self.ud
         for j in range(W):
-            ud.x[j] = self._mean[j]
-            ud.D[j] = self._std[j] * self._std[j]
+            ud.x[j] = self._prior.mean[j]
+            ud.D[j] = self._prior.variance[j]
             for i in range(j + 1, COUNT):
                 ud.L[j][i] = 0.0
         self._product_variance = math.inf
@@ -164,16 +118,14 @@ class PredictionError:
         """Remembers everything for `rollback`."""
         self.ud.save()
         for sensor in (self.pitch, self.depth):
-            sensor.noise.save()
-            sensor.force.save()
+            sensor.save()
 
     def rollback(self) -> None:
         """The last good estimate, with an empty window."""
         self.ud.rollback()
         self.window.clear()
         for sensor in (self.pitch, self.depth):
-            sensor.noise.rollback()
-            sensor.force.rollback()
+            sensor.rollback()
 
     @property
     def is_finite(self) -> bool:
@@ -183,14 +135,14 @@ class PredictionError:
     def restart(self) -> None:
         """Forgets the states and keeps the parameters, as after a gap."""
         for entry in (W, Q, THETA, ZETA):
-            self.ud.forget(entry, 0.0, self._std[entry] * self._std[entry])
+            self.ud.forget(entry, 0.0, self._prior.variance[entry])
         self.pitch.restart()
         self.depth.restart()
         self.window.clear()
 
     def restart_depth(self) -> None:
         """Forgets the depth alone: its sensor was set to another datum."""
-        self.ud.forget(ZETA, 0.0, self._std[ZETA] * self._std[ZETA])
+        self.ud.forget(ZETA, 0.0, self._prior.variance[ZETA])
         self.depth.restart()
         self.window.clear()
 
@@ -198,7 +150,7 @@ class PredictionError:
         """Forgets the states and the trims: a pitch of another datum needs other forces to hold it."""
         self.restart()
         for entry in (HEAVE_TRIM, PITCH_TRIM):
-            self._widen(entry, self._std[entry] * self._std[entry])
+            self._widen(entry, self._prior.variance[entry])
 
     def _widen(self, entry: int, variance: float) -> None:
         for j in range(COUNT):
@@ -222,7 +174,7 @@ class PredictionError:
                 self._set_prior()
                 self.restart()
                 self.ud.D[GAMMA] = 0.0
-                self.ud.D[KAPPA] = self._coupling_std * self._coupling_std if self.has_coupling else 0.0
+                self.ud.D[KAPPA] = self._prior.coupling if self.has_coupling else 0.0
         self.speed = speed
 
     def _adopt(self, speed: float) -> None:
@@ -244,8 +196,8 @@ class PredictionError:
         pitch_doubt = doubt * (ud.x[B2] * ud.x[B2] + ud.covariance(B2, B2)) if doubt > 0.0 else 0.0
         for _ in range(self._substeps):
             moments.update(ud)
-            heave = min(self._annealing[0] * moments.heave_variance, self._most[0])
-            pitch = min(self._annealing[1] * moments.pitch_variance, self._most[1])
+            heave = min(self._annealing[0] * moments.heave_variance, self._prior.caution[0])
+            pitch = min(self._annealing[1] * moments.pitch_variance, self._prior.caution[1])
             noise[0] = self._interval * (heave + self.depth.force.density + heave_doubt)
             noise[1] = self._interval * (pitch + self.pitch.force.density + pitch_doubt)
             self._propagation.advance(ud.x, rudder, self.speed, moments.heave_mean, moments.pitch_mean)
@@ -264,7 +216,7 @@ class PredictionError:
         self._product_variance *= 1.0 + self._step / 40.0
         entry = WANDERING[self._turn]
         self._turn = self._turn + 1 if self._turn + 1 < len(WANDERING) else 0
-        prior = self._std[entry] * self._std[entry]
+        prior = self._prior.variance[entry]
         size = max(ud.x[entry] * ud.x[entry], 0.0025 * prior)
         known = ud.covariance(entry, entry)
         if not is_excited or known == 0.0 or known >= min(prior, 0.04 * size):
@@ -279,32 +231,11 @@ class PredictionError:
             row[GAMMA] = ud.x[A1]
         ud.add(row, self._drift * size * self._step * len(WANDERING))
 
-    def is_outlier(self, sensor: Sensor, value: float, gate: float) -> bool:
-        """Whether the value is more than `gate` standard deviations from where it is expected."""
-        if not sensor.is_started:
-            return False
-        error = value - self.ud.x[sensor.entry]
-        variance = self.ud.covariance(sensor.entry, sensor.entry) + sensor.noise.variance
-        return not error * error <= gate * gate * max(variance, sensor.resolution * sensor.resolution)
-
     def learn(self, sensor: Sensor, value: float) -> None:
         """One update with a measured value."""
-        ud, entry = self.ud, sensor.entry
-        if not sensor.is_started:
-            sensor.is_started = True
-            ud.x[entry] = value
-        error = value - ud.x[entry]
-        noise = sensor.noise.variance
-        variance = ud.covariance(entry, entry) + noise
-        squared = error * error / variance
-        used = noise
-        if squared > HUBER * HUBER:
-            used += variance * (math.sqrt(squared) / HUBER - 1.0)
-        sensor.noise.learn(variance, squared)
-        sensor.force.learn(math.copysign(math.sqrt(min(squared, LIKELY)), error))
-        ud.observe_entry(entry, error, used * self.window.p)
+        used = sensor.learn(self.ud, value, self.window.p)
         if self.window.p > 1:
-            self.window.add(entry, value - self.window.before(entry), used)
+            self.window.add(sensor.entry, value - self.window.before(sensor.entry), used)
 
     def settle(self) -> None:
         """Ends an instant: the structure gamma = a1 kappa, the bounds of a stable vehicle, the window."""
@@ -316,7 +247,7 @@ class PredictionError:
         self.window.settle(self.ud)
 
     def _hold_within_bounds(self, entry: int) -> bool:
-        x, lower, upper = self.ud.x, self._lower[entry], self._upper[entry]
+        x, lower, upper = self.ud.x, self._prior.lower[entry], self._prior.upper[entry]
         if lower < x[entry] < upper:
             return False
         x[entry] = min(max(x[entry], lower), upper)

@@ -8,10 +8,11 @@ from firmware_model.config import EstimatorConfig
 from firmware_model.conversion import car_from_physical
 from firmware_model.estimate import PARAMETERS, Estimate
 from firmware_model.excitation import MovingVariance
-from firmware_model.prediction_error import PredictionError, Sensor
+from firmware_model.prediction_error import PredictionError
 from firmware_model.propagation import A1, A2, A3, B1, B2
 from firmware_model.restart_budget import RestartBudget
 from firmware_model.sample import Sample
+from firmware_model.sensor import Sensor
 from firmware_model.state import require
 from firmware_model.status import Status
 from firmware_model.tally import Tally
@@ -188,7 +189,7 @@ class RobustEstimator:
         """One measured value; outliers that do not end mean that the sensor has another datum."""
         if math.isnan(value):
             return Status.WAITING
-        if not self._filter.is_outlier(sensor, value, self._gate):
+        if not sensor.is_outlier(self._filter.ud, value, self._gate):
             self._outliers[sensor] = 0
             self._filter.learn(sensor, value)
             return Status.UPDATED
