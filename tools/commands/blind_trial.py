@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
         if runs[answer.name].has_answered
     }
     beside = {
-        path: answer.hidden
+        path: answer
         for path, answer in zip(paths, answers, strict=True)
         if answer.case != "outside" and not names_just(said.get(answer.name), answer.hidden)
     }

@@ -12,6 +12,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from tools.trial.answers import Answer
+
 ROOT = Path(__file__).parent.parent.parent
 DIAGNOSES = "diagnoses"
 RUN_FILE = "run.json"
@@ -58,11 +60,11 @@ def diagnose_all(
 
 
 def fit_true_structures(
-    folder: Path, hidden: dict[Path, list[str]], jobs: int, on_done: Callable[[], None]
+    folder: Path, answers: dict[Path, Answer], jobs: int, on_done: Callable[[], None]
 ) -> None:
     """Fits each recording with the effects that it hides; those fitted before are kept."""
     with ThreadPoolExecutor(jobs) as pool:
-        waiting = [pool.submit(_fit_true, folder, path, names) for path, names in hidden.items()]
+        waiting = [pool.submit(_fit_true, folder, path, answer) for path, answer in answers.items()]
         for done in as_completed(waiting):
             done.result()
             on_done()
@@ -82,10 +84,13 @@ def _environment() -> dict[str, str]:
     return os.environ | {"OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(paths)}
 
 
-def _fit_true(folder: Path, recording: Path, names: list[str]) -> None:
+def _fit_true(folder: Path, recording: Path, answer: Answer) -> None:
     out = folder / DIAGNOSES / recording.stem / TRUE_FILE
     if not out.is_file():
-        told = ["--effects", ",".join(names), "--out", str(out)]
+        start = dict(answer.base)
+        for coefficients in answer.coefficients.values():
+            start |= coefficients
+        told = ["--effects", ",".join(answer.hidden), "--start", json.dumps(start), "--out", str(out)]
         command = [sys.executable, "-m", "tools.true_structure", str(recording), *told]
         subprocess.run(command, env=_environment(), capture_output=True, timeout=MOST_SECONDS, check=False)
 
