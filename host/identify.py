@@ -8,8 +8,9 @@ from typing import Literal
 import numpy as np
 
 from host.equations import NAMES
+from host.fit import Fit
 from host.identify_car import ESTIMATED, car_least_squares, run_estimator
-from host.maximum_likelihood import Fit, fit_maximum_likelihood
+from host.maximum_likelihood import fit_maximum_likelihood
 from host.model import VehicleModel, model_of
 from host.predict import Prediction, predict
 from host.recording import Array, Recording

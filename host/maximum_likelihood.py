@@ -2,21 +2,20 @@
 
 Minimises -log L = 1/2 sum_k [log det S_k + e_k^T S_k^-1 e_k] over the parameters, the initial state of each
 recording and the noise levels. In output error the model runs freely and S is the sensors' noise; in filter
-error a Kalman filter with white unknown forces gives e and S (Maine and Iliff, NASA RP-1138; Klein and
-Morelli, Aircraft System Identification, ch. 6). Parameters move by Gauss-Newton steps with exact
-sensitivities at fixed gain, the noise levels between them by a simplex search; every step goes downhill.
+error (host.filter_error) a Kalman filter gives e and S (Maine and Iliff, NASA RP-1138; Klein and Morelli,
+Aircraft System Identification, ch. 6). Every step goes downhill.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import minimize
 
 from host.equations import BASE, Structure
+from host.filter_error import filter_error, whitened_innovations
+from host.fit import Fit, finished
 from host.gauss_newton import GaussNewton, Mask, Point, whiten
-from host.propagate import Inputs, free_run, innovations, inputs_of, kalman_pass
+from host.propagate import Inputs, free_run, innovations, inputs_of
 from host.recording import Array, Recording
 from host.start_values import start_values
 from host.whiteness import is_white
@@ -29,42 +28,6 @@ SMALLEST_NOISE = np.array([1e-12, 1e-10])
 RUNAWAY = 1e7  # of a sensitivity, in SI: the model leaves the recording exponentially
 ANNEALING = (0.1, 0.01, 1e-3, 1e-4)  # s, variance of the unknown force over that of all force
 NOISE_FREE = 100.0 * SMALLEST_NOISE  # what is left of noise-free data is the integration error
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Fit:
-    """The maximum of the likelihood over M recordings.
-
-    parameters   (n,) in the order of structure.names
-    free         (n,) False where the parameter was held
-    information  (n, n) Fisher information of the parameters, initial states eliminated; zero for held ones
-    initial      states (4,) at each recording's first row
-    noise        (4,) variances of pitch rad^2, depth m^2; densities of unknown heave, pitch acceleration
-    whitened     innovations over their deviation, (2, N) each, NaN where nothing was measured
-    scores       whitened sensitivities of the free parameters, (2, free, N) each, what the initial states
-                 could explain taken out
-    """
-
-    structure: Structure
-    parameters: Array
-    free: Mask
-    information: Array
-    initial: list[Array]
-    noise: Array
-    whitened: list[Array]
-    scores: list[Array]
-    log_likelihood: float
-    iterations: int
-    converged: bool
-
-    @property
-    def has_process_noise(self) -> bool:
-        return bool(self.noise[2:].any())
-
-    @property
-    def samples(self) -> int:
-        """Values measured, pitch and depth together."""
-        return sum(int(np.isfinite(e).sum()) for e in self.whitened)
 
 
 def fit_maximum_likelihood(
@@ -124,7 +87,7 @@ def output_error(
     cost = _concentrated_cost(noise, inputs)
     if not np.isfinite(cost) or not all(np.abs(S).max() < RUNAWAY for _, S in parts):
         # A start from which the model runs away: nothing can be improved from here.
-        return _finished(
+        return finished(
             point.with_noise(np.ones(4)), [(0 * e, 0 * S) for e, S in parts], inputs, free, -np.inf, 0, False
         )
     while not converged and iterations < most_iterations:
@@ -145,26 +108,7 @@ def output_error(
         parts = _innovations(point, inputs)
         damping = damping / 10.0
     point = point.with_noise(np.concatenate([noise, [0.0, 0.0]]))
-    return _finished(point, _whitened_by(noise, parts), inputs, free, -cost, iterations, converged)
-
-
-def filter_error(start: Fit, inputs: list[Inputs], rounds: int = 6) -> Fit:
-    """Alternates noise levels and Gauss-Newton steps at the Kalman gain they imply."""
-    noise = start.noise
-    if not start.has_process_noise:
-        # Half of what output error calls sensor noise may really be force: a neutral place to begin.
-        step = float(np.median(np.concatenate([i.drive[3] for i in inputs])))
-        noise = np.concatenate([start.noise[:2] / 2.0, start.noise[:2][::-1] * step])
-    point = Point(start.structure, start.parameters, start.initial, noise)
-    point, likelihood = _fit_noise(point, inputs, evaluations=70)
-    converged, used = False, 0
-    while not converged and used < rounds:
-        used, before = used + 1, likelihood
-        point, likelihood = _gauss_newton_filter(point, inputs, start.free, likelihood)
-        point, likelihood = _fit_noise(point, inputs, evaluations=30)
-        converged = likelihood - before < 0.05
-    white = _whitened_at(point, inputs)
-    return _finished(point, white, inputs, start.free, likelihood, used, converged)
+    return finished(point, _whitened_by(noise, parts), inputs, free, -cost, iterations, converged)
 
 
 def annealed(start: Point, inputs: list[Inputs], free: Mask, accelerations: tuple[float, float]) -> Point:
@@ -181,81 +125,11 @@ def annealed(start: Point, inputs: list[Inputs], free: Mask, accelerations: tupl
         point = point.with_noise(np.array([*start.noise[:2], *forces]))
         for _ in range(2):
             with np.errstate(all="ignore"):
-                white = _whitened_at(point, inputs)
+                white = whitened_innovations(point, inputs)
                 if not all(np.abs(S).max() < 1e3 * RUNAWAY for _, S in white):
                     return start
                 point = GaussNewton(white, point, free).trial(1e-6)
     return point.with_noise(start.noise)
-
-
-def _gauss_newton_filter(
-    point: Point, inputs: list[Inputs], free: Mask, likelihood: float
-) -> tuple[Point, float]:
-    damping = 1e-3
-    for _ in range(4):
-        step = GaussNewton(_whitened_at(point, inputs), point, free)
-        trial, trial_likelihood = point, -np.inf
-        while trial_likelihood <= likelihood and damping < 1e8:
-            trial = step.trial(damping)
-            trial_likelihood = _filter_likelihood(trial, inputs)
-            damping *= 8.0
-        if trial_likelihood <= likelihood:
-            break
-        gained, point, likelihood = trial_likelihood - likelihood, trial, trial_likelihood
-        damping /= 100.0
-        if gained < 0.01:
-            break
-    return point, likelihood
-
-
-def _fit_noise(point: Point, inputs: list[Inputs], evaluations: int) -> tuple[Point, float]:
-    """Simplex search over three log ratios to the pitch variance; the common scale has a closed form."""
-
-    def scaled(log_ratios: Array) -> tuple[Array, float]:
-        noise = np.concatenate([[1.0], np.exp(np.clip(log_ratios, -60.0, 60.0))]) * point.noise[0]
-        quadratic, log_det, count = _filter_terms(point.with_noise(noise), inputs)
-        scale = quadratic / count
-        if not np.isfinite(quadratic) or scale <= 0.0:
-            return noise, np.inf
-        return noise * scale, 0.5 * (log_det + count * np.log(scale) + count)
-
-    start = np.log(np.maximum(point.noise[1:], 1e-30) / point.noise[0])
-    result = minimize(
-        lambda ratios: scaled(ratios)[1],
-        start,
-        method="Nelder-Mead",
-        options=dict(
-            initial_simplex=start + np.vstack([np.zeros(3), np.diag([0.7, 2.0, 2.0])]),
-            xatol=0.05,
-            fatol=0.05,
-            maxfev=evaluations,
-        ),
-    )
-    noise, cost = scaled(result.x)
-    return point.with_noise(noise), -cost
-
-
-def _filter_terms(point: Point, inputs: list[Inputs]) -> tuple[float, float, int]:
-    """sum e^T S^-1 e, sum log det S over what was measured, and the number of values measured."""
-    quadratic = log_det = 0.0
-    count = 0
-    for x0, one in zip(point.initial, inputs, strict=True):
-        run = kalman_pass(point.parameters, x0, point.noise, one)
-        S11, S12, S22 = run.variance
-        missing = 1.0 - one.present
-        det = S11 * S22 - S12**2
-        e1, e2 = run.error
-        quadratic += float(np.sum((S22 * e1**2 - 2.0 * S12 * e1 * e2 + S11 * e2**2) / det))
-        # A missing value leaves its sensor variance alone in S: take it out again.
-        log_det += float(np.sum(np.log(det)) - missing.sum(axis=1) @ np.log(point.noise[:2]))
-        count += int(one.present.sum())
-    return quadratic, log_det, count
-
-
-def _filter_likelihood(point: Point, inputs: list[Inputs]) -> float:
-    quadratic, log_det, _ = _filter_terms(point, inputs)
-    value = -0.5 * (quadratic + log_det)
-    return float(value) if np.isfinite(value) else -np.inf
 
 
 def residuals_at(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:
@@ -270,15 +144,6 @@ def _innovations(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]
 def _whitened_by(noise: Array, parts: list[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
     variance = np.array([[noise[0]], [0.0], [noise[1]]])
     return [whiten(e, S, np.repeat(variance, e.shape[1], axis=1)) for e, S in parts]
-
-
-def _whitened_at(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:
-    white = []
-    for x0, one in zip(point.initial, inputs, strict=True):
-        run = kalman_pass(point.parameters, x0, point.noise, one)
-        error, sensitivity = innovations(point.parameters, x0, one, run.gains)
-        white.append(whiten(error, sensitivity, run.variance))
-    return white
 
 
 def _free_run_errors(point: Point, inputs: list[Inputs]) -> list[Array]:
@@ -300,30 +165,3 @@ def _residual_noise(errors: list[Array], inputs: list[Inputs]) -> Array:
 def _concentrated_cost(noise: Array, inputs: list[Inputs]) -> float:
     count = sum(one.present.sum(axis=1) for one in inputs)
     return 0.5 * float(np.sum(count * (np.log(noise) + 1.0)))
-
-
-def _finished(
-    point: Point,
-    white: list[tuple[Array, Array]],
-    inputs: list[Inputs],
-    free: Mask,
-    likelihood: float,
-    iterations: int,
-    converged: bool,
-) -> Fit:
-    normal = GaussNewton(white, point, free)
-    information = np.zeros((free.size, free.size))
-    information[np.ix_(free, free)] = normal.information()
-    return Fit(
-        structure=point.structure,
-        parameters=point.parameters,
-        free=free,
-        information=information,
-        initial=point.initial,
-        noise=point.noise,
-        whitened=[np.where(i.present > 0.0, e, np.nan) for (e, _), i in zip(white, inputs, strict=True)],
-        scores=normal.scores(white),
-        log_likelihood=likelihood,
-        iterations=iterations,
-        converged=converged,
-    )

@@ -65,7 +65,7 @@ def model_of(
     noise: Array | None = None,
     effects: list[dict[str, Any]] | None = None,
 ) -> VehicleModel:
-    """A model learnt from these recordings; `noise` as in host.maximum_likelihood.Fit."""
+    """A model learnt from these recordings; `noise` as in host.fit.Fit."""
     named: dict[str, float] = {}
     if noise is not None:
         named = {"pitch_rad": float(np.sqrt(noise[0])), "depth_m": float(np.sqrt(noise[1]))}

@@ -1,10 +1,11 @@
-"""Propagation of the equations over a recording: free run, exact sensitivities, Kalman innovations.
+"""Propagation of the equations over a recording: free run and exact sensitivities.
 
 Between rows the command is held (zero-order hold), as the actuator holds it, and the state advances by
 classical fourth-order Runge-Kutta in sub-steps short enough that its error stays below the sensors'
 resolution; derivatives are those of the very same steps, by CasADi, so gradients are exact.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -62,7 +63,7 @@ def inputs_of(recording: Recording, structure: Structure = BASE) -> Inputs:
 
 
 @dataclass(frozen=True)
-class _Form:
+class Form:
     """What a CasADi function depends on: one is built for each form and kept."""
 
     structure: Structure
@@ -108,7 +109,7 @@ class _Form:
 
 
 @cache
-def _initial(form: _Form) -> ca.Function:
+def _initial(form: Form) -> ca.Function:
     """All states at the first row, and their derivatives by the parameters and the four base states."""
     x0, (_, p, drive) = ca.SX.sym("x0", NX0), form.symbols()
     x = form.structure.initial(x0, p, drive)
@@ -117,7 +118,7 @@ def _initial(form: _Form) -> ca.Function:
 
 
 @cache
-def _free_run(form: _Form) -> ca.Function:
+def _free_run(form: Form) -> ca.Function:
     x, p, drive = form.symbols()
     return ca.Function(
         "free_run", [x, drive, p], [form.step(x, p, drive), ca.vertcat(x, form.outputs(x, p, drive))]
@@ -125,7 +126,7 @@ def _free_run(form: _Form) -> ca.Function:
 
 
 @cache
-def _sensitivities(form: _Form) -> ca.Function:
+def _sensitivities(form: Form) -> ca.Function:
     """One step of the innovations form x+ = F(x + K e) with d/d(parameters, initial state) carried along."""
     x, p, drive = form.symbols()
     columns = form.np + NX0
@@ -147,47 +148,18 @@ def _sensitivities(form: _Form) -> ca.Function:
 
 
 @cache
-def _kalman(form: _Form) -> ca.Function:
-    """One step of the extended Kalman filter with white force and moment noise; gives e, S and K."""
-    x, p, drive = form.symbols()
-    P = ca.SX.sym("P", form.nx, form.nx)
-    measured, present = ca.SX.sym("measured", 2), ca.SX.sym("present", 2)
-    noise = ca.SX.sym("noise", 4)
-    y = form.outputs(x, p, drive)
-    C = ca.diag(present) @ ca.jacobian(y, x)
-    error = present * (measured - y)
-    S = C @ P @ C.T + ca.diag(noise[:2])
-    det = S[0, 0] * S[1, 1] - S[0, 1] * S[1, 0]
-    S_inverse = ca.vertcat(ca.horzcat(S[1, 1], -S[0, 1]), ca.horzcat(-S[1, 0], S[0, 0])) / det
-    K = P @ C.T @ S_inverse
-    updated = x + K @ error
-    reduced = ca.SX.eye(form.nx) - K @ C
-    P_updated = reduced @ P @ reduced.T + K @ ca.diag(noise[:2]) @ K.T
-    before = ca.SX.sym("before", form.nx)
-    after = form.step(before, p, drive)
-    A = ca.Function("A", [before, p, drive], [after, ca.jacobian(after, before)])
-    x_next, Ax = A(updated, p, drive)
-    Q = ca.diag(ca.vertcat(noise[2], noise[3], ca.SX(form.nx - 2, 1))) * drive[3]
-    P_next = Ax @ (P_updated + Q / 2) @ Ax.T + Q / 2
-    carried, carried_next = ca.vertcat(x, ca.vec(P)), ca.vertcat(x_next, ca.vec(P_next))
-    per_step = ca.vertcat(drive, measured, present)
-    result = ca.vertcat(error, S[0, 0], S[0, 1], S[1, 1], ca.vec(K), x)
-    return ca.Function("kalman", [carried, per_step, ca.vertcat(p, noise)], [carried_next, result])
+def over_rows(step: Callable[[Form], ca.Function], form: Form, rows: int) -> ca.Function:
+    """The function of one step, carried over all rows of a recording."""
+    return step(form).mapaccum(f"rows_{rows}", rows)
 
 
-_ONE_STEP = {"free": _free_run, "sensitivities": _sensitivities, "kalman": _kalman}
+def form_of(inputs: Inputs) -> Form:
+    """Of the functions that propagate this recording."""
+    return Form(inputs.structure, inputs.substeps, inputs.drive.shape[0])
 
 
-@cache
-def _over(kind: str, form: _Form, rows: int) -> ca.Function:
-    return _ONE_STEP[kind](form).mapaccum(f"{kind}_{rows}", rows)
-
-
-def _form(inputs: Inputs) -> _Form:
-    return _Form(inputs.structure, inputs.substeps, inputs.drive.shape[0])
-
-
-def _start(form: _Form, parameters: Array, initial: Array, inputs: Inputs) -> tuple[Array, Array]:
+def start_of(form: Form, parameters: Array, initial: Array, inputs: Inputs) -> tuple[Array, Array]:
+    """All states at the first row (nx,), and their derivatives by the parameters and the base states."""
     x, slopes = _initial(form)(initial, parameters, inputs.drive[:, 0])
     return np.asarray(x, dtype=float).ravel(), np.asarray(slopes, dtype=float)
 
@@ -202,9 +174,9 @@ class FreeRun:
 
 def free_run(parameters: Array, initial: Array, inputs: Inputs) -> FreeRun:
     """Simulates from the base states [w, q, theta, zeta] (4,) at the first row."""
-    form = _form(inputs)
-    start, _ = _start(form, parameters, initial, inputs)
-    _, result = _over("free", form, inputs.drive.shape[1])(start, inputs.drive, parameters)
+    form = form_of(inputs)
+    start, _ = start_of(form, parameters, initial, inputs)
+    _, result = over_rows(_free_run, form, inputs.drive.shape[1])(start, inputs.drive, parameters)
     table = np.asarray(result, dtype=float)
     return FreeRun(states=table[: form.nx], outputs=table[form.nx :])
 
@@ -217,39 +189,13 @@ def innovations(
     gains  (2 nx, N) Kalman gain of each row, column-major nx x 2; None for output error (free run).
            The derivative is taken at fixed gain.
     """
-    form, rows = _form(inputs), inputs.drive.shape[1]
+    form, rows = form_of(inputs), inputs.drive.shape[1]
     gains = np.zeros((form.nx * 2, rows)) if gains is None else gains
-    start, slopes = _start(form, parameters, initial, inputs)
+    start, slopes = start_of(form, parameters, initial, inputs)
     carried = np.concatenate([start, slopes.ravel(order="F")])
     per_step = np.vstack([inputs.drive, inputs.measured, gains])
-    _, result = _over("sensitivities", form, rows)(carried, per_step, parameters)
+    _, result = over_rows(_sensitivities, form, rows)(carried, per_step, parameters)
     table = np.asarray(result, dtype=float)
     error = inputs.present * (inputs.measured - table[:2])
     sensitivity = table[2:].reshape((2, form.np + NX0, rows), order="F") * inputs.present[:, None, :]
     return error, sensitivity
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class KalmanPass:
-    """Innovations (2, N), their variances S11, S12, S22 (3, N), gains (2 nx, N), predicted states (nx, N)."""
-
-    error: Array
-    variance: Array
-    gains: Array
-    states: Array
-
-
-def kalman_pass(parameters: Array, initial: Array, noise: Array, inputs: Inputs) -> KalmanPass:
-    """Runs the Kalman filter over a recording, from an initial state taken as exact.
-
-    noise  (4,) variances of pitch (rad^2) and depth (m^2), spectral densities of the unknown heave
-           acceleration ((m/s^2)^2 s) and pitch acceleration ((rad/s^2)^2 s)
-    """
-    form, rows = _form(inputs), inputs.drive.shape[1]
-    start, _ = _start(form, parameters, initial, inputs)
-    carried = np.concatenate([start, np.zeros(form.nx**2)])
-    per_step = np.vstack([inputs.drive, inputs.measured, inputs.present])
-    _, result = _over("kalman", form, rows)(carried, per_step, np.concatenate([parameters, noise]))
-    table = np.asarray(result, dtype=float)
-    split = 5 + 2 * form.nx
-    return KalmanPass(error=table[:2], variance=table[2:5], gains=table[5:split], states=table[split:])

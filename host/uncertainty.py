@@ -3,8 +3,8 @@
 import numpy as np
 
 from host.equations import NAMES
+from host.fit import Fit
 from host.gauss_newton import Mask
-from host.maximum_likelihood import Fit
 from host.recording import Array
 from host.whiteness import autocovariance, is_white
 

@@ -14,7 +14,8 @@ from host.diagnosis.search import NAMING_MARGIN, Explanation, Search
 from host.diagnosis.spans import divide
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.equations import NAMES, Slot
-from host.maximum_likelihood import Fit, filter_error
+from host.filter_error import filter_error
+from host.fit import Fit
 from host.propagate import inputs_of
 from host.recording import Array, Recording
 from host.uncertainty import covariance

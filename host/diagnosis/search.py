@@ -15,8 +15,9 @@ from host.catalogue import CATALOGUE, structure_of
 from host.diagnosis.first_guess import accelerations, first_guess
 from host.diagnosis.noise_floor import noise_floor
 from host.equations import NAMES, Effect
+from host.fit import Fit
 from host.gauss_newton import GaussNewton, Point
-from host.maximum_likelihood import RUNAWAY, Fit, annealed, fit_maximum_likelihood, output_error, residuals_at
+from host.maximum_likelihood import RUNAWAY, annealed, fit_maximum_likelihood, output_error, residuals_at
 from host.propagate import Inputs, inputs_of
 from host.recording import Array, Recording
 

@@ -2,7 +2,8 @@ import numpy as np
 from exact_dive import TABLE_1, Dive, fly
 from scipy.stats import multivariate_normal
 
-from host.propagate import free_run, innovations, inputs_of, kalman_pass
+from host.kalman import kalman_pass
+from host.propagate import free_run, innovations, inputs_of
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 

@@ -1,0 +1,74 @@
+"""The maximum of the likelihood over recordings, and what it says of its own accuracy."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.equations import Structure
+from host.gauss_newton import GaussNewton, Mask, Point
+from host.propagate import Inputs
+from host.recording import Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fit:
+    """The maximum of the likelihood over M recordings.
+
+    parameters   (n,) in the order of structure.names
+    free         (n,) False where the parameter was held
+    information  (n, n) Fisher information of the parameters, initial states eliminated; zero for held ones
+    initial      states (4,) at each recording's first row
+    noise        (4,) variances of pitch rad^2, depth m^2; densities of unknown heave, pitch acceleration
+    whitened     innovations over their deviation, (2, N) each, NaN where nothing was measured
+    scores       whitened sensitivities of the free parameters, (2, free, N) each, what the initial states
+                 could explain taken out
+    """
+
+    structure: Structure
+    parameters: Array
+    free: Mask
+    information: Array
+    initial: list[Array]
+    noise: Array
+    whitened: list[Array]
+    scores: list[Array]
+    log_likelihood: float
+    iterations: int
+    converged: bool
+
+    @property
+    def has_process_noise(self) -> bool:
+        return bool(self.noise[2:].any())
+
+    @property
+    def samples(self) -> int:
+        """Values measured, pitch and depth together."""
+        return sum(int(np.isfinite(e).sum()) for e in self.whitened)
+
+
+def finished(
+    point: Point,
+    white: list[tuple[Array, Array]],
+    inputs: list[Inputs],
+    free: Mask,
+    likelihood: float,
+    iterations: int,
+    converged: bool,
+) -> Fit:
+    """The fit at a point, from its whitened innovations and sensitivities."""
+    normal = GaussNewton(white, point, free)
+    information = np.zeros((free.size, free.size))
+    information[np.ix_(free, free)] = normal.information()
+    return Fit(
+        structure=point.structure,
+        parameters=point.parameters,
+        free=free,
+        information=information,
+        initial=point.initial,
+        noise=point.noise,
+        whitened=[np.where(i.present > 0.0, e, np.nan) for (e, _), i in zip(white, inputs, strict=True)],
+        scores=normal.scores(white),
+        log_likelihood=likelihood,
+        iterations=iterations,
+        converged=converged,
+    )

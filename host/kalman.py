@@ -1,0 +1,65 @@
+"""Kalman filter over a recording: innovations when random forces act on the vehicle."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import casadi as ca
+import numpy as np
+
+from host.propagate import Form, Inputs, form_of, over_rows, start_of
+from host.recording import Array
+
+
+@cache
+def _kalman(form: Form) -> ca.Function:
+    """One step of the extended Kalman filter with white force and moment noise; gives e, S and K."""
+    x, p, drive = form.symbols()
+    P = ca.SX.sym("P", form.nx, form.nx)
+    measured, present = ca.SX.sym("measured", 2), ca.SX.sym("present", 2)
+    noise = ca.SX.sym("noise", 4)
+    y = form.outputs(x, p, drive)
+    C = ca.diag(present) @ ca.jacobian(y, x)
+    error = present * (measured - y)
+    S = C @ P @ C.T + ca.diag(noise[:2])
+    det = S[0, 0] * S[1, 1] - S[0, 1] * S[1, 0]
+    S_inverse = ca.vertcat(ca.horzcat(S[1, 1], -S[0, 1]), ca.horzcat(-S[1, 0], S[0, 0])) / det
+    K = P @ C.T @ S_inverse
+    updated = x + K @ error
+    reduced = ca.SX.eye(form.nx) - K @ C
+    P_updated = reduced @ P @ reduced.T + K @ ca.diag(noise[:2]) @ K.T
+    before = ca.SX.sym("before", form.nx)
+    after = form.step(before, p, drive)
+    A = ca.Function("A", [before, p, drive], [after, ca.jacobian(after, before)])
+    x_next, Ax = A(updated, p, drive)
+    Q = ca.diag(ca.vertcat(noise[2], noise[3], ca.SX(form.nx - 2, 1))) * drive[3]
+    P_next = Ax @ (P_updated + Q / 2) @ Ax.T + Q / 2
+    carried, carried_next = ca.vertcat(x, ca.vec(P)), ca.vertcat(x_next, ca.vec(P_next))
+    per_step = ca.vertcat(drive, measured, present)
+    result = ca.vertcat(error, S[0, 0], S[0, 1], S[1, 1], ca.vec(K), x)
+    return ca.Function("kalman", [carried, per_step, ca.vertcat(p, noise)], [carried_next, result])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KalmanPass:
+    """Innovations (2, N), their variances S11, S12, S22 (3, N), gains (2 nx, N), predicted states (nx, N)."""
+
+    error: Array
+    variance: Array
+    gains: Array
+    states: Array
+
+
+def kalman_pass(parameters: Array, initial: Array, noise: Array, inputs: Inputs) -> KalmanPass:
+    """Runs the Kalman filter over a recording, from an initial state taken as exact.
+
+    noise  (4,) variances of pitch (rad^2) and depth (m^2), spectral densities of the unknown heave
+           acceleration ((m/s^2)^2 s) and pitch acceleration ((rad/s^2)^2 s)
+    """
+    form, rows = form_of(inputs), inputs.drive.shape[1]
+    start, _ = start_of(form, parameters, initial, inputs)
+    carried = np.concatenate([start, np.zeros(form.nx**2)])
+    per_step = np.vstack([inputs.drive, inputs.measured, inputs.present])
+    _, result = over_rows(_kalman, form, rows)(carried, per_step, np.concatenate([parameters, noise]))
+    table = np.asarray(result, dtype=float)
+    split = 5 + 2 * form.nx
+    return KalmanPass(error=table[:2], variance=table[2:5], gains=table[5:split], states=table[split:])
