@@ -59,7 +59,6 @@ def kalman_pass(parameters: Array, initial: Array, noise: Array, inputs: Inputs)
     start, _ = start_of(form, parameters, initial, inputs)
     carried = np.concatenate([start, np.zeros(form.nx**2)])
     per_step = np.vstack([inputs.drive, inputs.measured, inputs.present])
-    _, result = over_rows(_kalman, form, rows)(carried, per_step, np.concatenate([parameters, noise]))
-    table = np.asarray(result, dtype=float)
+    table = over_rows(_kalman, form, rows)(carried, per_step, np.concatenate([parameters, noise]))
     split = 5 + 2 * form.nx
     return KalmanPass(error=table[:2], variance=table[2:5], gains=table[5:split], states=table[split:])

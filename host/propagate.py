@@ -147,10 +147,28 @@ def _sensitivities(form: Form) -> ca.Function:
     return ca.Function("sensitivities", [carried, per_step, p], [carried_next, ca.vertcat(y, ca.vec(seen))])
 
 
+OverRows = Callable[[Array, Array, Array], Array]
+
+
 @cache
-def over_rows(step: Callable[[Form], ca.Function], form: Form, rows: int) -> ca.Function:
-    """The function of one step, carried over all rows of a recording."""
-    return step(form).mapaccum(f"rows_{rows}", rows)
+def over_rows(step: Callable[[Form], ca.Function], form: Form, rows: int) -> OverRows:
+    """One step's function carried over N rows: (start, per row (m, N), parameters) -> results (k, N)."""
+    accumulated = step(form).mapaccum(f"rows_{rows}", rows)
+    results = accumulated.size2_out(1), accumulated.size1_out(1)
+
+    def run(start: Array, per_row: Array, parameters: Array) -> Array:
+        # CasADi reads and writes these arrays in place, column by column; its own matrices would be
+        # copied number by number, which takes as long as the propagation.
+        own = [start, np.ascontiguousarray(per_row.T), np.tile(parameters, (rows, 1))]
+        out = np.empty(results)
+        buffer, evaluate = accumulated.buffer()
+        for k, argument in enumerate(own):
+            buffer.set_arg(k, memoryview(argument))
+        buffer.set_res(1, memoryview(out))
+        evaluate()
+        return out.T
+
+    return run
 
 
 def form_of(inputs: Inputs) -> Form:
@@ -176,8 +194,7 @@ def free_run(parameters: Array, initial: Array, inputs: Inputs) -> FreeRun:
     """Simulates from the base states [w, q, theta, zeta] (4,) at the first row."""
     form = form_of(inputs)
     start, _ = start_of(form, parameters, initial, inputs)
-    _, result = over_rows(_free_run, form, inputs.drive.shape[1])(start, inputs.drive, parameters)
-    table = np.asarray(result, dtype=float)
+    table = over_rows(_free_run, form, inputs.drive.shape[1])(start, inputs.drive, parameters)
     return FreeRun(states=table[: form.nx], outputs=table[form.nx :])
 
 
@@ -194,8 +211,7 @@ def innovations(
     start, slopes = start_of(form, parameters, initial, inputs)
     carried = np.concatenate([start, slopes.ravel(order="F")])
     per_step = np.vstack([inputs.drive, inputs.measured, gains])
-    _, result = over_rows(_sensitivities, form, rows)(carried, per_step, parameters)
-    table = np.asarray(result, dtype=float)
+    table = over_rows(_sensitivities, form, rows)(carried, per_step, parameters)
     error = inputs.present * (inputs.measured - table[:2])
     sensitivity = table[2:].reshape((2, form.np + NX0, rows), order="F") * inputs.present[:, None, :]
     return error, sensitivity
