@@ -85,20 +85,16 @@ class Form:
         """The state one row later."""
         h = drive[3] / self.substeps
         states = self.structure.states
+        slope = _slope(self)
         for k in range(self.substeps):
             time = drive[4] + k * h
             at_start = self.structure.chain(x, p, drive, time)
             moved = self.structure.actuate(at_start, h)
-
-            def slope(x: ca.SX, time: ca.SX, plane: ca.SX = at_start.plane) -> ca.SX:
-                chain = self.structure.chain(x, p, drive, time)
-                chain.plane = plane
-                return self.structure.derivative(chain)
-
-            k1 = slope(x, time)
-            k2 = slope(x + h / 2 * k1, time + h / 2)
-            k3 = slope(x + h / 2 * k2, time + h / 2)
-            k4 = slope(x + h * k3, time + h)
+            held = (at_start.plane, p, drive)
+            k1 = slope(x, time, *held)
+            k2 = slope(x + h / 2 * k1, time + h / 2, *held)
+            k3 = slope(x + h / 2 * k2, time + h / 2, *held)
+            k4 = slope(x + h * k3, time + h, *held)
             x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
             for name, value in moved.items():
                 x[states.index(name)] = value
@@ -106,6 +102,16 @@ class Form:
 
     def outputs(self, x: ca.SX, p: ca.SX, drive: ca.SX) -> ca.SX:
         return self.structure.outputs(self.structure.chain(x, p, drive, drive[4]))
+
+
+@cache
+def _slope(form: Form) -> ca.Function:
+    """x' for a plane angle that is held; as a function of its own, as inlining it is quicker than tracing."""
+    x, p, drive = form.symbols()
+    time, plane = ca.SX.sym("time"), ca.SX.sym("plane")
+    chain = form.structure.chain(x, p, drive, time)
+    chain.plane = plane
+    return ca.Function("slope", [x, time, plane, p, drive], [form.structure.derivative(chain)])
 
 
 @cache
@@ -126,25 +132,43 @@ def _free_run(form: Form) -> ca.Function:
 
 
 @cache
-def _sensitivities(form: Form) -> ca.Function:
-    """One step of the innovations form x+ = F(x + K e) with d/d(parameters, initial state) carried along."""
+def _free_sensitivities(form: Form) -> ca.Function:
+    """One step of the free run with d/d(parameters, initial state) carried along."""
     x, p, drive = form.symbols()
-    columns = form.np + NX0
+    S = ca.SX.sym("S", form.nx, form.np + NX0)
+    y, seen = _seen(form, x, S, p, drive)
+    carried, carried_next = ca.vertcat(x, ca.vec(S)), _carried_on(form, x, S, p, drive)
+    return ca.Function("free_sensitivities", [carried, drive, p], [carried_next, ca.vertcat(y, ca.vec(seen))])
+
+
+@cache
+def _sensitivities(form: Form) -> ca.Function:
+    """The same for the innovations form x+ = F(x + K e), at fixed gain."""
+    x, p, drive = form.symbols()
     measured, gain = ca.SX.sym("measured", 2), ca.SX.sym("gain", form.nx * 2)
-    S = ca.SX.sym("S", form.nx, columns)
+    S = ca.SX.sym("S", form.nx, form.np + NX0)
     K = ca.reshape(gain, form.nx, 2)
+    y, seen = _seen(form, x, S, p, drive)
+    carried = ca.vertcat(x, ca.vec(S))
+    carried_next = _carried_on(form, x + K @ (measured - y), S - K @ seen, p, drive)
+    per_step = ca.vertcat(drive, measured, gain)
+    return ca.Function("sensitivities", [carried, per_step, p], [carried_next, ca.vertcat(y, ca.vec(seen))])
+
+
+def _seen(form: Form, x: ca.SX, S: ca.SX, p: ca.SX, drive: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """The outputs and their sensitivities."""
     y = form.outputs(x, p, drive)
-    seen = ca.jacobian(y, x) @ S + ca.horzcat(ca.jacobian(y, p), ca.SX(2, NX0))
-    updated = x + K @ (measured - y)
-    S_updated = S - K @ seen
+    return y, ca.jacobian(y, x) @ S + ca.horzcat(ca.jacobian(y, p), ca.SX(2, NX0))
+
+
+def _carried_on(form: Form, x: ca.SX, S: ca.SX, p: ca.SX, drive: ca.SX) -> ca.SX:
+    """State and sensitivities one row later."""
     before = ca.SX.sym("before", form.nx)
     after = form.step(before, p, drive)
     A = ca.Function("A", [before, p, drive], [after, ca.jacobian(after, before), ca.jacobian(after, p)])
-    x_next, Ax, Ap = A(updated, p, drive)
-    S_next = Ax @ S_updated + ca.horzcat(Ap, ca.SX(form.nx, NX0))
-    carried, carried_next = ca.vertcat(x, ca.vec(S)), ca.vertcat(x_next, ca.vec(S_next))
-    per_step = ca.vertcat(drive, measured, gain)
-    return ca.Function("sensitivities", [carried, per_step, p], [carried_next, ca.vertcat(y, ca.vec(seen))])
+    x_next, Ax, Ap = A(x, p, drive)
+    S_next = Ax @ S + ca.horzcat(Ap, ca.SX(form.nx, NX0))
+    return ca.vertcat(x_next, ca.vec(S_next))
 
 
 OverRows = Callable[[Array, Array, Array], Array]
@@ -207,11 +231,13 @@ def innovations(
            The derivative is taken at fixed gain.
     """
     form, rows = form_of(inputs), inputs.drive.shape[1]
-    gains = np.zeros((form.nx * 2, rows)) if gains is None else gains
     start, slopes = start_of(form, parameters, initial, inputs)
     carried = np.concatenate([start, slopes.ravel(order="F")])
-    per_step = np.vstack([inputs.drive, inputs.measured, gains])
-    table = over_rows(_sensitivities, form, rows)(carried, per_step, parameters)
+    if gains is None:
+        table = over_rows(_free_sensitivities, form, rows)(carried, inputs.drive, parameters)
+    else:
+        per_step = np.vstack([inputs.drive, inputs.measured, gains])
+        table = over_rows(_sensitivities, form, rows)(carried, per_step, parameters)
     error = inputs.present * (inputs.measured - table[:2])
     sensitivity = table[2:].reshape((2, form.np + NX0, rows), order="F") * inputs.present[:, None, :]
     return error, sensitivity
