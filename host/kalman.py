@@ -14,7 +14,8 @@ from host.recording import Array
 def _kalman(form: Form) -> ca.Function:
     """One step of the extended Kalman filter with white force and moment noise; gives e, S and K."""
     x, p, drive = form.symbols()
-    P = ca.SX.sym("P", form.nx, form.nx)
+    lower = ca.Sparsity.lower(form.nx)  # a covariance is carried by its lower triangle alone
+    P = ca.tril2symm(ca.SX.sym("P", lower))
     measured, present = ca.SX.sym("measured", 2), ca.SX.sym("present", 2)
     noise = ca.SX.sym("noise", 4)
     y = form.outputs(x, p, drive)
@@ -33,15 +34,27 @@ def _kalman(form: Form) -> ca.Function:
     x_next, Ax = A(updated, p, drive)
     Q = ca.diag(ca.vertcat(noise[2], noise[3], ca.SX(form.nx - 2, 1))) * drive[3]
     P_next = Ax @ (P_updated + Q / 2) @ Ax.T + Q / 2
-    carried, carried_next = ca.vertcat(x, ca.vec(P)), ca.vertcat(x_next, ca.vec(P_next))
+    carried = ca.vertcat(x, _of_lower(P, lower))
+    carried_next = ca.vertcat(x_next, _of_lower(P_next, lower))
     per_step = ca.vertcat(drive, measured, present)
     result = ca.vertcat(error, S[0, 0], S[0, 1], S[1, 1], ca.vec(K), x)
+    carried_next, result = ca.cse([carried_next, result])
     return ca.Function("kalman", [carried, per_step, ca.vertcat(p, noise)], [carried_next, result])
+
+
+def _of_lower(matrix: ca.SX, lower: ca.Sparsity) -> ca.SX:
+    return ca.vertcat(*ca.project(ca.densify(matrix), lower).nonzeros())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KalmanPass:
-    """Innovations (2, N), their variances S11, S12, S22 (3, N), gains (2 nx, N), predicted states (nx, N)."""
+    """What the filter saw at each of N rows, before it took in that row's measurement.
+
+    error     (2, N) innovations of pitch and depth, 0 where missing
+    variance  (3, N) S11, S12, S22 of the innovations; 1, 0, 1 where missing
+    gains     (2 nx, N), column-major nx x 2
+    states    (nx, N) predicted
+    """
 
     error: Array
     variance: Array
@@ -57,8 +70,10 @@ def kalman_pass(parameters: Array, initial: Array, noise: Array, inputs: Inputs)
     """
     form, rows = form_of(inputs), inputs.drive.shape[1]
     start, _ = start_of(form, parameters, initial, inputs)
-    carried = np.concatenate([start, np.zeros(form.nx**2)])
+    carried = np.concatenate([start, np.zeros(form.nx * (form.nx + 1) // 2)])
     per_step = np.vstack([inputs.drive, inputs.measured, inputs.present])
     table = over_rows(_kalman, form, rows)(carried, per_step, np.concatenate([parameters, noise]))
     split = 5 + 2 * form.nx
-    return KalmanPass(error=table[:2], variance=table[2:5], gains=table[5:split], states=table[split:])
+    variance = table[2:5]
+    variance[::2][inputs.present == 0.0] = 1.0
+    return KalmanPass(error=table[:2], variance=variance, gains=table[5:split], states=table[split:])

@@ -116,7 +116,7 @@ def _without_sea(search: Search, best: Explanation) -> tuple[Explanation, bool]:
     if all(is_white(e) for e in best.fit.whitened):
         return best, False
     inputs = [inputs_of(recording, best.fit.structure) for recording in search.recordings]
-    filtered = filter_error(best.fit, inputs, rounds=2)
+    filtered = filter_error(best.fit, inputs)
     if filtered.log_likelihood - best.fit.log_likelihood < np.log(best.fit.samples):
         return best, False
     if filtered.noise[2] + filtered.noise[3] <= 0.0:
@@ -125,7 +125,7 @@ def _without_sea(search: Search, best: Explanation) -> tuple[Explanation, bool]:
     for name in sorted(best.names):
         smaller = search.without(kept, name)
         fewer = [inputs_of(recording, smaller.fit.structure) for recording in search.recordings]
-        rival = filter_error(smaller.fit, fewer, rounds=2)
+        rival = filter_error(smaller.fit, fewer)
         saved = search.free_parameters(kept.names) - search.free_parameters(smaller.names)
         loss = 2.0 * (filtered.log_likelihood - rival.log_likelihood) - saved * np.log(best.fit.samples)
         if loss < NAMING_MARGIN:
@@ -175,7 +175,7 @@ def _refitted(explanation: Explanation, recordings: list[Recording], has_sea: bo
     if not has_sea:
         return again
     inputs = [inputs_of(recording, again.fit.structure) for recording in recordings]
-    fit: Fit = filter_error(again.fit, inputs, rounds=3)
+    fit: Fit = filter_error(again.fit, inputs)
     return Explanation(again.names, fit, again.bic)
 
 
