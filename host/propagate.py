@@ -39,8 +39,10 @@ class Inputs:
     substeps: int
 
 
-def inputs_of(recording: Recording, structure: Structure = BASE) -> Inputs:
-    """Inputs of one recording."""
+def inputs_of(
+    recording: Recording, structure: Structure = BASE, longest_substep: float = LONGEST_SUBSTEP
+) -> Inputs:
+    """Inputs of one recording. Longer sub-steps (s) suit vehicles whose modes are known to be slow."""
     intervals = recording.intervals
     known = np.full(intervals.size, float(recording.has_speed))
     speed = recording.speed if recording.has_speed else np.zeros(intervals.size)
@@ -58,8 +60,18 @@ def inputs_of(recording: Recording, structure: Structure = BASE) -> Inputs:
         drive=np.vstack([recording.rudder, speed, known, intervals, recording.time, *earlier]),
         measured=np.where(present, measured, 0.0),
         present=present.astype(float),
-        substeps=int(np.ceil(recording.step / max(LONGEST_SUBSTEP, recording.step / MOST_SUBSTEPS))),
+        substeps=int(np.ceil(recording.step / max(longest_substep, recording.step / MOST_SUBSTEPS) - 1e-6)),
     )
+
+
+def longest_substep(parameters: Array) -> float:
+    """Sub-step, s, that resolves the modes of a vehicle with these base parameters: a fifth of 1 / rate.
+
+    Twice the rate is allowed for, as effects to come may quicken it.
+    """
+    a1, a2, a3 = parameters[:3]
+    fastest = max(abs(a1), abs(a2), abs(a3) ** 0.5)
+    return float(np.clip(0.4 / fastest, LONGEST_SUBSTEP, 2.0 * LONGEST_SUBSTEP))
 
 
 @dataclass(frozen=True)

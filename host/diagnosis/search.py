@@ -18,7 +18,7 @@ from host.equations import NAMES, Effect
 from host.fit import Fit
 from host.gauss_newton import GaussNewton, Point
 from host.maximum_likelihood import RUNAWAY, annealed, fit_maximum_likelihood, output_error, residuals_at
-from host.propagate import Inputs, inputs_of
+from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
 from host.recording import Array, Recording
 
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis a trim offset is an effect with a name
@@ -72,6 +72,7 @@ class Search:
             "depth": float(np.nanmean(np.concatenate([r.depth for r in recordings]))),
         }
         self._inputs: dict[Names, list[Inputs]] = {}
+        self._longest_substep = LONGEST_SUBSTEP
         self._gains: dict[tuple[Names, str], list[tuple[float, Array]]] = {}
         if known is not None:
             self._scale["speed"] = float(known.fit.parameters[NAMES.index("u0")])
@@ -81,6 +82,7 @@ class Search:
         fit = fit_maximum_likelihood(recordings, held=base, noise_model="output_error")
         self.base = self._remember(frozenset(), fit)
         self._scale["speed"] = float(fit.parameters[fit.structure.names.index("u0")])
+        self._longest_substep = longest_substep(fit.parameters)
 
     def run(self) -> list[Explanation]:
         """All explanations tried, best first."""
@@ -255,7 +257,9 @@ class Search:
     def _inputs_for(self, names: Names) -> list[Inputs]:
         if names not in self._inputs:
             structure = structure_of(names)
-            self._inputs[names] = [inputs_of(recording, structure) for recording in self.recordings]
+            self._inputs[names] = [
+                inputs_of(recording, structure, self._longest_substep) for recording in self.recordings
+            ]
         return self._inputs[names]
 
     def _remember(self, names: Names, fit: Fit) -> Explanation:
