@@ -99,7 +99,7 @@ class _Scoring:
         diagonal = np.diag(self.information)
         normal = self.information + np.diag(damping * diagonal + 1e-6 * diagonal.max())
         stride = np.clip(np.linalg.solve(normal, self.score), -LONGEST_STRIDE, LONGEST_STRIDE)
-        return np.maximum(self.noise * np.exp(stride), LEAST_NOISE)
+        return np.asarray(np.maximum(self.noise * np.exp(stride), LEAST_NOISE))
 
 
 def _first_noise(start: Fit, inputs: list[Inputs]) -> Array:

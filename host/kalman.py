@@ -43,7 +43,8 @@ def _kalman(form: Form) -> ca.Function:
 
 
 def _of_lower(matrix: ca.SX, lower: ca.Sparsity) -> ca.SX:
-    return ca.vertcat(*ca.project(ca.densify(matrix), lower).nonzeros())
+    rows, columns = lower.get_triplet()
+    return ca.vertcat(*(matrix[row, column] for row, column in zip(rows, columns, strict=True)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

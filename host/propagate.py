@@ -8,6 +8,7 @@ resolution; derivatives are those of the very same steps, by CasADi, so gradient
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -197,10 +198,11 @@ def over_rows(step: Callable[[Form], ca.Function], form: Form, rows: int) -> Ove
         # copied number by number, which takes as long as the propagation.
         own = [start, np.ascontiguousarray(per_row.T), np.tile(parameters, (rows, 1))]
         out = np.empty(results)
-        buffer, evaluate = accumulated.buffer()
+        buffer: Any
+        buffer, evaluate = accumulated.buffer()  # typed in C terms: pointer and size
         for k, argument in enumerate(own):
-            buffer.set_arg(k, memoryview(argument))
-        buffer.set_res(1, memoryview(out))
+            buffer.set_arg(k, argument.data)
+        buffer.set_res(1, out.data)
         evaluate()
         return out.T
 
