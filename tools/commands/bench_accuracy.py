@@ -15,6 +15,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--only", metavar="TEXT", default="", help="lines that hold this text, e.g. ml or 5 Hz"
     )
+    parser.add_argument(
+        "--dives",
+        type=int,
+        default=10,
+        metavar="N",
+        help="of the free runs beside other packages (default 10)",
+    )
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes at once")
     parser.add_argument("--quiet", action="store_true", help="no progress")
 
@@ -23,7 +30,10 @@ def run(args: argparse.Namespace) -> int:
     """0 done; 1 if the live or the bench estimator diverged."""
     require_bench()
     from tools.accuracy.methods import CASES, COMPARED, DRIFTING, FOLLOWING, LIVE, REGRESSIONS
+    from tools.accuracy.packages import measure_packages
     from tools.accuracy.table import measure, show
+    from tools.compare.held_out import table_of
+    from tools.compare.methods import missing
 
     if args.seeds < 2 or args.workers < 1:
         raise ConfigError(f"--seeds must be at least 2 and --workers 1 (got {args.seeds}, {args.workers})")
@@ -36,5 +46,10 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"--only must be part of the name of a case or a method (got {args.only!r})")
     with progress(args.quiet) as say:
         lines = measure(pairs, 12 if args.quick else args.seeds, args.workers, say)
+        runs = measure_packages(args.dives, args.workers, say) if args.dives > 0 and not args.only else []
     print(show(lines))
+    if runs:
+        print(f"\n{first}: learnt from one dive, run freely over another; medians of {args.dives} dives")
+        print(table_of(runs))
+        print(missing())
     return int(any(line.score.diverged for line in lines if line.method not in REGRESSIONS))
