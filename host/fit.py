@@ -1,6 +1,6 @@
 """The maximum of the likelihood over recordings, and what it says of its own accuracy."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,6 +19,8 @@ class Fit:
     information  (n, n) Fisher information of the parameters, initial states eliminated; zero for held ones
     initial      states (4,) at each recording's first row
     noise        (4,) variances of pitch rad^2, depth m^2; densities of unknown heave, pitch acceleration
+    wander       variance and correlation time s of the part of each sensor's error, pitch and depth, that
+                 wanders (2, 2); zero where all of it is white
     whitened     innovations over their deviation, (2, N) each, NaN where nothing was measured
     scores       whitened sensitivities of the free parameters, (2, free, N) each, what the initial states
                  could explain taken out
@@ -35,10 +37,25 @@ class Fit:
     log_likelihood: float
     iterations: int
     converged: bool
+    wander: Array = field(default_factory=lambda: np.zeros((2, 2)))
 
     @property
     def has_process_noise(self) -> bool:
         return bool(self.noise[2:].any())
+
+    @property
+    def has_coloured_noise(self) -> bool:
+        return bool(self.wander.any())
+
+    @property
+    def noise_levels(self) -> int:
+        """How many numbers describe the noise."""
+        return 4 if self.has_process_noise else 6 if self.has_coloured_noise else 2
+
+    @property
+    def bic(self) -> float:
+        """Bayesian information criterion as far as the noise model goes: less is better."""
+        return float(self.noise_levels * np.log(self.samples) - 2.0 * self.log_likelihood)
 
     @property
     def samples(self) -> int:

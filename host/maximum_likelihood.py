@@ -2,8 +2,9 @@
 
 Minimises -log L = 1/2 sum_k [log det S_k + e_k^T S_k^-1 e_k] over the parameters, the initial state of each
 recording and the noise levels. In output error the model runs freely and S is the sensors' noise; in filter
-error (host.filter_error) a Kalman filter gives e and S (Maine and Iliff, NASA RP-1138; Klein and Morelli,
-Aircraft System Identification, ch. 6). Every step goes downhill.
+error (host.filter_error) a Kalman filter gives e and S; where the sensors' errors wander, a filter in each
+sensor does (host.coloured_noise). Source: Maine and Iliff, NASA RP-1138; Klein and Morelli, Aircraft System
+Identification, ch. 6.
 """
 
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from host.coloured_noise import coloured_noise
 from host.equations import BASE, Structure
 from host.filter_error import filter_error, whitened_innovations
 from host.fit import Fit, finished
@@ -43,7 +45,8 @@ def fit_maximum_likelihood(
 
     held  values of parameters by name that are not to be estimated. Where the recordings carry measured
           speed, u0 is held at its mean: speed and depth together leave it no freedom.
-    noise_model  "auto" filters where the free run's residuals are not white and the likelihood gains by it
+    noise_model  "auto": where the free run's residuals are not white, random forces or sensors that wander,
+                 or neither, whichever has the least BIC
     starts  (parameters, initial states of each recording); by default found for the base equations,
             with the effects' own parameters at their first probe
     """
@@ -70,11 +73,11 @@ def fit_maximum_likelihood(
     nothing_left = all(is_white(e) for e in best.whitened) or bool((best.noise[:2] < NOISE_FREE).all())
     if noise_model == "output_error" or (noise_model == "auto" and nothing_left):
         return best
-    on_progress("filter error")
+    on_progress("random forces, or sensors that wander")
     filtered = filter_error(best, inputs)
-    gain = filtered.log_likelihood - best.log_likelihood
-    is_better = 2.0 * gain > 2.0 * np.log(best.samples)
-    return filtered if is_better or noise_model == "filter_error" else best
+    if noise_model == "filter_error" or (filtered.bic < best.bic and all(map(is_white, filtered.whitened))):
+        return filtered
+    return min((best, filtered, coloured_noise(best, inputs)), key=lambda fit: fit.bic)
 
 
 def output_error(

@@ -1,0 +1,143 @@
+"""Ascent of the likelihood of innovations, whatever the noise model that makes them.
+
+-log L = 1/2 sum_k [log det S_k + e_k^T S_k^-1 e_k] with innovations e and their variances S. Each step moves
+the parameters by Gauss-Newton, with exact sensitivities at fixed gain, and the noise levels by the method of
+scoring; every step goes uphill.
+"""
+
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+
+from host.gauss_newton import GaussNewton, Mask, Point
+from host.recording import Array
+
+DIFFERENCE = 1e-3  # of a log noise level, for derivatives
+LONGEST_STRIDE = 2.5  # of a log noise level in one step
+SETTLED = 0.02  # of the log-likelihood: a step that gains less is the last
+
+
+class Pass(Protocol):
+    """Innovations over one recording of N rows.
+
+    error     (2, N) of pitch and depth, 0 where missing
+    variance  (3, N) S11, S12, S22; 1, 0, 1 where missing
+    """
+
+    @property
+    def error(self) -> Array: ...
+
+    @property
+    def variance(self) -> Array: ...
+
+
+P = TypeVar("P", bound=Pass)
+
+
+class NoiseModel(Protocol[P]):
+    """What turns a point, with its noise levels, into innovations; `least`, `most` bound the levels."""
+
+    least: Array
+    most: Array
+
+    def passes(self, point: Point) -> list[P]:
+        """Of each recording."""
+
+    def whitened(self, point: Point, passes: list[P]) -> list[tuple[Array, Array]]:
+        """The innovations over their deviation (2, N), and their sensitivities (2, parameters + 4, N)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place(Generic[P]):
+    """A point of the search, the innovations there, and the log-likelihood."""
+
+    point: Point
+    passes: list[P]
+    likelihood: float
+
+
+def place(point: Point, model: NoiseModel[P]) -> Place[P]:
+    """The likelihood at a point; a run that leaves the numbers has -inf."""
+    with np.errstate(all="ignore"):
+        passes = model.passes(point)
+        likelihood = -0.5 * sum(float(np.sum(_quadratic(run) + np.log(_det(run)))) for run in passes)
+    return Place(point, passes, likelihood if np.isfinite(likelihood) else -np.inf)
+
+
+def ascend(point: Point, model: NoiseModel[P], free: Mask, most_steps: int) -> tuple[Place[P], int, bool]:
+    """Climbs from a point; gives where it ended, after how many steps, and whether it had converged."""
+    here, damping, converged, used = place(point, model), 1e-3, False, 0
+    while not converged and used < most_steps:
+        used += 1
+        step = GaussNewton(model.whitened(here.point, here.passes), here.point, free)
+        scoring = _Scoring(here, model)
+        while True:
+            there = place(step.trial(damping).with_noise(scoring.trial(damping)), model)
+            if there.likelihood > here.likelihood or damping > 1e6:
+                break
+            damping = max(damping * 10.0, 1e-3)
+        gained = there.likelihood - here.likelihood
+        converged = not gained > SETTLED
+        if gained > 0.0:
+            here = there
+        damping /= 20.0
+    return here, used, converged
+
+
+class _Scoring(Generic[P]):
+    """Scores and Fisher information of the log noise levels, by differences of the innovations.
+
+    d log L = 1/2 sum_k [e^T S^-1 dS S^-1 e - tr(S^-1 dS) - 2 e^T S^-1 de]
+    F_ij = sum_k [1/2 tr(S^-1 d_i S S^-1 d_j S) + d_i e^T S^-1 d_j e]
+    """
+
+    def __init__(self, here: Place[P], model: NoiseModel[P]) -> None:
+        self.noise, self.least, self.most = here.point.noise, model.least, model.most
+        levels = self.noise.size
+        self.score, self.information = np.zeros(levels), np.zeros((levels, levels))
+        moved = [
+            model.passes(here.point.with_noise(self.noise * np.exp(DIFFERENCE * unit)))
+            for unit in np.eye(levels)
+        ]
+        for k, run in enumerate(here.passes):
+            de = np.array([(passes[k].error - run.error) / DIFFERENCE for passes in moved])
+            dS = np.array([(passes[k].variance - run.variance) / DIFFERENCE for passes in moved])
+            inverse = _inverse(run)
+            e = _times(inverse, run.error)
+            # S^-1 dS, row by row of the 2 x 2 matrix
+            ratio = np.stack([_times(inverse, dS[:, :2]), _times(inverse, dS[:, 1:])], axis=2)
+            pull = dS[:, 0] * e[0] ** 2 + 2.0 * dS[:, 1] * e[0] * e[1] + dS[:, 2] * e[1] ** 2
+            trace = ratio[:, 0, 0] + ratio[:, 1, 1]
+            self.score += 0.5 * np.sum(pull - trace, axis=1) - np.einsum("ick,ck->i", de, e)
+            self.information += 0.5 * np.einsum("iabk,jbak->ij", ratio, ratio)
+            self.information += np.einsum("ick,jck->ij", de, _times(inverse, de))
+
+    def trial(self, damping: float) -> Array:
+        """The noise levels one damped step on."""
+        diagonal = np.diag(self.information)
+        normal = self.information + np.diag(damping * diagonal + 1e-6 * diagonal.max())
+        stride = np.clip(np.linalg.solve(normal, self.score), -LONGEST_STRIDE, LONGEST_STRIDE)
+        return np.asarray(np.clip(self.noise * np.exp(stride), self.least, self.most))
+
+
+def _det(run: Pass) -> Array:
+    S11, S12, S22 = run.variance
+    return np.asarray(S11 * S22 - S12**2)
+
+
+def _inverse(run: Pass) -> Array:
+    """S^-1 as its elements 11, 12, 22 (3, N)."""
+    S11, S12, S22 = run.variance
+    return np.asarray(np.stack([S22, -S12, S11]) / _det(run))
+
+
+def _times(symmetric: Array, vectors: Array) -> Array:
+    """Rows of 2 x 2 matrices (3, N) times vectors (..., 2, N)."""
+    m11, m12, m22 = symmetric
+    first, second = vectors[..., 0, :], vectors[..., 1, :]
+    return np.stack([m11 * first + m12 * second, m12 * first + m22 * second], axis=-2)
+
+
+def _quadratic(run: Pass) -> Array:
+    return np.asarray(np.sum(run.error * _times(_inverse(run), run.error), axis=0))

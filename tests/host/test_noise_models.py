@@ -1,0 +1,90 @@
+"""The noise models of the bench against dense algebra, and against recordings made to mistake them."""
+
+import numpy as np
+import pytest
+from exact_dive import TABLE_1, Dive, fly
+from scipy.signal import lfilter
+
+from host.ascent import place
+from host.coloured_noise import WanderingSensors, coloured_noise
+from host.filter_error import RandomForces, filter_error
+from host.gauss_newton import Point
+from host.maximum_likelihood import fit_maximum_likelihood
+from host.propagate import free_run, inputs_of
+from host.uncertainty import covariance
+
+TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
+
+
+def wandering(rows: int, deviation: float, time: float, seed: int) -> np.ndarray:
+    kept = np.exp(-0.1 / time)
+    kicks = np.random.default_rng(seed).standard_normal(rows) * deviation * np.sqrt(1.0 - kept**2)
+    return np.asarray(lfilter([1.0], [1.0, -kept], kicks))
+
+
+def with_wandering_depth(duration: float = 150.0):  # type: ignore[no-untyped-def]
+    recording, _ = fly(Dive(duration=duration))
+    recording.depth[:] += wandering(recording.time.size, 0.03, 2.0, 5)
+    return recording
+
+
+def test_likelihood_of_wandering_sensors_equals_dense_algebra_with_samples_missing() -> None:
+    recording, states = fly(Dive(duration=6.0, missing=0.3))
+    inputs = inputs_of(recording)
+    noise = np.array([3e-6, 1e-4, 2e-6, 9e-4, 0.4, 2.0])
+    here = place(Point(inputs.structure, TRUTH, [states[:, 0]], noise), WanderingSensors([inputs]))
+    residual = inputs.measured - free_run(TRUTH, states[:, 0], inputs).outputs
+    apart = np.abs(recording.time[:, None] - recording.time)
+    dense = 0.0
+    for i in range(2):
+        seen = inputs.present[i] > 0.0
+        R = noise[2 + i] * np.exp(-apart / noise[4 + i]) + noise[i] * np.eye(apart.shape[0])
+        R, e = R[np.ix_(seen, seen)], residual[i, seen]
+        dense -= 0.5 * (np.linalg.slogdet(R)[1] + e @ np.linalg.solve(R, e))
+    assert here.likelihood == pytest.approx(dense, rel=1e-9)
+
+
+def test_wandering_depth_is_not_taken_for_force() -> None:
+    fit = fit_maximum_likelihood([with_wandering_depth()])
+    assert fit.has_coloured_noise
+    assert not fit.has_process_noise
+    assert np.sqrt(fit.wander[1, 0]) == pytest.approx(0.03, rel=0.3)
+    assert fit.wander[1, 1] == pytest.approx(2.0, rel=0.5)
+    std = np.sqrt(np.diag(covariance(fit)))
+    assert (np.abs(fit.parameters - TRUTH) < 4.0 * std).all()
+
+
+def test_a_coarse_depth_sensor_costs_accuracy_not_truth() -> None:
+    recording, _ = fly(Dive(duration=200.0))
+    recording.depth[:] = 0.1 * np.round(recording.depth / 0.1)
+    fit = fit_maximum_likelihood([recording])
+    assert not fit.has_process_noise
+    std = np.sqrt(np.diag(covariance(fit)))
+    assert (np.abs(fit.parameters - TRUTH) < 4.0 * std).all()
+    assert (np.abs(fit.parameters[:6] / TRUTH[:6] - 1.0) < 0.15).all()
+
+
+@pytest.mark.parametrize("which", ["forces", "wandering"])
+def test_no_noise_level_can_be_moved_uphill(which: str) -> None:
+    if which == "forces":
+        recording, _ = fly(Dive(duration=100.0, force_density=(1e-3, 1e-3)))
+    else:
+        recording = with_wandering_depth(100.0)
+    inputs = [inputs_of(recording)]
+    start = fit_maximum_likelihood([recording], noise_model="output_error")
+    if which == "forces":
+        fit, model = filter_error(start, inputs), RandomForces(inputs)
+        noise = fit.noise
+    else:
+        fit, model = coloured_noise(start, inputs), WanderingSensors(inputs)
+        noise = np.concatenate([fit.noise[:2], fit.wander[:, 0], fit.wander[:, 1]])
+    point = Point(fit.structure, fit.parameters, fit.initial, noise)
+    top = place(point, model).likelihood
+    assert top == pytest.approx(fit.log_likelihood, abs=1e-6)
+    for level in range(noise.size):
+        for factor in (0.8, 1.25):
+            moved = noise.copy()
+            moved[level] *= factor
+            assert (
+                place(point.with_noise(moved), model).likelihood < top + 0.1
+            )  # what the last step may leave
