@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib import pyplot as plt
+from matplotlib.lines import Line2D
 
 from firmware_model import car_from_physical
 from host.plots import MEASURED, MODEL, RUDDER, data_uri
@@ -252,7 +253,6 @@ def missing_figure(found: Study) -> str:
                         markersize=3,
                         color=method.colour,
                         linewidth=1.3,
-                        label=f"{method.name}, {PATTERNS[p].split(' of')[0]}",
                     )
             axis.set_ylim(1e-4, 2e3)
             if row == 0:
@@ -261,13 +261,12 @@ def missing_figure(found: Study) -> str:
                 axis.set_xlabel("missing, %")
             if d == 0:
                 axis.set_ylabel(label)
-    figure.legend(
-        *axes[0, 0].get_legend_handles_labels(),
-        loc="upper center",
-        bbox_to_anchor=(0.5, 0.01),
-        frameon=False,
-        ncols=4,
-    )
+    keys = [Line2D([], [], color=m.colour, marker="o", markersize=3, label=m.name) for m in found.methods]
+    keys += [
+        Line2D([], [], color="k", linestyle=style, linewidth=1.3, label=pattern)
+        for style, pattern in zip(("-", "--"), PATTERNS, strict=True)
+    ]
+    figure.legend(handles=keys, loc="upper center", bbox_to_anchor=(0.5, 0.01), frameon=False, ncols=4)
     figure.tight_layout()
     return data_uri(figure)
 

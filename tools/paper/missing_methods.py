@@ -10,6 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from firmware_model import Mils, physical_from_car
+from firmware_model.config import EstimatorConfig
+from firmware_model.estimator import make_estimator
+from firmware_model.sample import Sample
 from host.equations import NAMES
 from host.maximum_likelihood import fit_maximum_likelihood
 from host.recording import Array, Recording
@@ -54,6 +57,25 @@ class Recursive:
         return _physical(found)
 
 
+def live(recording: Recording) -> Array:
+    """The noise-proof estimator of `mils run`, sample by sample, told a speed 20 % too low."""
+    speed = 0.8 * float(printed()["table1"]["u0"])
+    estimator = make_estimator(EstimatorConfig(step=recording.step, speed=speed))
+    for time, depth, pitch, rudder in zip(
+        recording.time.tolist(),
+        recording.depth.tolist(),
+        recording.pitch.tolist(),
+        recording.rudder.tolist(),
+        strict=True,
+    ):
+        estimator.update(Sample(t_us=round(1e6 * time), depth=depth, pitch=pitch, rudder=rudder))
+    values = estimator.estimate().values
+    found = [values[name] for name in (*PHYSICAL, "u0")]
+    if not np.isfinite(found).all():
+        raise ValueError("too little was learnt")
+    return np.array([*found, 0.0, 0.0])
+
+
 def maximum_likelihood(recording: Recording) -> Array:
     """`mils identify`: the continuous-time equations, nothing assumed about the speed.
 
@@ -66,6 +88,7 @@ METHODS = (
     Method(name="batch LS on CAR rows", colour="#8d99a6", identify=least_squares),
     Method(name="RLS", colour="#2c6e9b", identify=Recursive(1)),
     Method(name="MILS p = 5", colour="#d98324", identify=Recursive(5)),
+    Method(name="live, noise-proof", colour="#8e44ad", identify=live),
     Method(name="maximum likelihood", colour="#2f855a", identify=maximum_likelihood),
 )
 

@@ -118,7 +118,8 @@ def _facts(searches: dict[str, list[Search]], same: Equality, lost: Study) -> di
         "equality": same,
         "most_apart": 100.0 * float(same.difference.max()),
         "noisy_car": float(noisy[:3].min()),
-        "noisy_ml": float(noisy[3]),
+        "noisy_live": float(noisy[3]),
+        "noisy_ml": float(noisy[4]),
     }
 
 
