@@ -100,11 +100,16 @@ class DbcDialect:
             ):
                 continue
             fields = {signal: values.get(signal, 0.0 if is_state else nan) for signal in signals}
-            if is_state:
-                period_us = self.clock_period_us(name, "time")
-                fields["time"] = (t_us if period_us is None else t_us % period_us) * 1e-6
-            packets += self.encode(name, fields, t_us)
+            packets += (
+                self.encode_stamped(name, fields, t_us) if is_state else self.encode(name, fields, t_us)
+            )
         return packets
+
+    def encode_stamped(self, name: str, fields: Mapping[str, float], t_us: int) -> list[Packet]:
+        """`encode` with `t_us` in the message's own signal "time"."""
+        period_us = self.clock_period_us(name, "time")
+        stamp = (t_us if period_us is None else t_us % period_us) * 1e-6
+        return self.encode(name, {**fields, "time": stamp}, t_us)
 
     def _used(self, signal: CanSignal) -> list[Any]:
         """cantools' signals of a table entry. Raises BridgeError when the DBC has no such signal."""

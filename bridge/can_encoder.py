@@ -61,3 +61,11 @@ class CanEncoder:
         except ValueError:
             self.counts["refused.not_encodable"] += 1
             return []
+
+    def encode_warning(self, t_us: int, values: Mapping[str, float]) -> list[Packet]:
+        """The MISMATCH frame of the default DBC with these `values`: mismatch, mism_ratio."""
+        try:
+            return self._estimates.encode_stamped("MISMATCH", values, t_us)
+        except ValueError:
+            self.counts["refused.not_encodable"] += 1
+            return []

@@ -33,6 +33,12 @@ class CanSource:
             for packet in self._encoder.encode_estimates(t_us, values):
                 self._link.write(packet)
 
+    def warn(self, t_us: int, notice: str, values: Mapping[str, float]) -> None:  # noqa: ARG002
+        """The MISMATCH frame of the default DBC; a bus has no text."""
+        if self._publishes:
+            for packet in self._encoder.encode_warning(t_us, values):
+                self._link.write(packet)
+
     def close(self) -> None:
         self._link.close()
 

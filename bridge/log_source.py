@@ -57,6 +57,9 @@ class LogSource:
     def publish(self, t_us: int, values: Mapping[str, float]) -> None:
         """A log hears nothing."""
 
+    def warn(self, t_us: int, notice: str, values: Mapping[str, float]) -> None:
+        """A log hears nothing."""
+
     def close(self) -> None:
         self._next = len(self._measurements)
 

@@ -14,6 +14,7 @@ from bridge.servo_mix import pulses_for
 _UINT32 = 0xFFFFFFFF
 _FLOAT_MAX = 3.4e38  # single precision
 MAX_NAME = 10  # characters of NAMED_VALUE_FLOAT
+MAX_TEXT = 50  # characters of STATUSTEXT
 
 
 class MavlinkEncoder:
@@ -103,6 +104,13 @@ class MavlinkEncoder:
             single = value if abs(value) <= _FLOAT_MAX else copysign(inf, value)
             packed += self._pack(dialect.MAVLink_named_value_float_message(boot_ms, raw, single))
         return packed
+
+    def warning(self, text: str) -> bytes:
+        """STATUSTEXT; ValueError on a text that one message cannot hold."""
+        raw = text.encode("ascii", errors="replace")
+        if not 1 <= len(raw) <= MAX_TEXT:
+            raise ValueError(f"text must have 1..{MAX_TEXT} characters (got {text!r})")
+        return self._pack(dialect.MAVLink_statustext_message(dialect.MAV_SEVERITY_WARNING, raw, 0, 0))
 
     def request_rate(self, target: tuple[int, int], message: str, rate_hz: float) -> bytes:
         """SET_MESSAGE_INTERVAL: asks `target` (system, component) for `message` at `rate_hz`."""

@@ -63,6 +63,10 @@ class MavlinkSource:
         """One NAMED_VALUE_FLOAT each; the autopilot passes them on and logs them."""
         self._send(self._sender().named_values(t_us, values))
 
+    def warn(self, t_us: int, notice: str, values: Mapping[str, float]) -> None:
+        """STATUSTEXT, which a ground station shows and the autopilot logs, and NAMED_VALUE_FLOATs."""
+        self._send(self._sender().warning(notice) + self._sender().named_values(t_us, values))
+
     def close(self) -> None:
         self._link.close()
 

@@ -26,5 +26,8 @@ class Source(Protocol):
     def publish(self, t_us: int, values: Mapping[str, float]) -> None:
         """Sends named values (at most 10 characters each) to whoever listens on this link."""
 
+    def warn(self, t_us: int, notice: str, values: Mapping[str, float]) -> None:
+        """Sends a warning (at most 50 characters) and its named values, once, to whoever listens."""
+
     def close(self) -> None:
         """Releases the link; may be called twice."""

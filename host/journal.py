@@ -69,8 +69,11 @@ class Journal:
         """What was published; a value that is not finite is written as null."""
         self._append([{"estimate": values, "t_us": t_us}])
 
-    def event(self, event: str, detail: str = "") -> None:
-        self._append([{"event": event, "detail": detail, "wall_s": round(self._wall_s(), 3)}])
+    def event(self, event: str, detail: str = "", facts: Mapping[str, object] | None = None) -> None:
+        """What happened, in a sentence; `facts` stand beside it in the record."""
+        self._append(
+            [{"event": event, "detail": detail, "wall_s": round(self._wall_s(), 3), **(facts or {})}]
+        )
 
     def sync(self) -> None:
         """Has the system write everything to the medium; survives a loss of power from then on."""
@@ -114,7 +117,7 @@ class JournalReading:
 
     header     "vehicle", "version", "started", "configuration" as `host.toml_config.build` takes it
     estimates  as published: "t_us" and "estimate"
-    events     "event", "detail" and "wall_s"
+    events     "event", "detail" and "wall_s"; a "mismatch" also "t_us", "slot", "change", "ratio" ...
     counts     lines by kind; "damaged" lines could not be read
     notes      sentences for people about what was lost
     """

@@ -84,6 +84,14 @@ class LastingSource:
             except LinkClosed as closed:
                 self._lose(closed)
 
+    def warn(self, t_us: int, notice: str, values: Mapping[str, float]) -> None:
+        """As `Source.warn`; nothing while the link is gone."""
+        if self._source is not None:
+            try:
+                self._source.warn(t_us, notice, values)
+            except LinkClosed as closed:
+                self._lose(closed)
+
     def close(self) -> None:
         """May be called twice."""
         self._drop()

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import isfinite
 
 from bridge.errors import LinkClosed
@@ -15,6 +15,7 @@ from host.align import Aligner
 from host.errors import HostError
 from host.journal import Journal
 from host.lasting_source import LastingSource
+from host.mismatch import Mismatch, MismatchWatch
 from host.silence import SilenceWatch
 from host.state import load_state, save_state, set_aside
 from host.vehicle import Vehicle
@@ -32,6 +33,8 @@ class Progress:
     samples       grid instants by the name of the estimator's status
     refused       by cause, with who refused in front: "link.refused.crc", "alignment.refused.backwards", ...
     never_heard   needed quantities that have not come once
+    mismatch      the last alarm, until the vehicle as it is now has become the usual one
+    alarms        raised since the start
     lost_lines    of the journal, because they could not be written
     cause         why the run ended; empty while it goes on
     """
@@ -43,6 +46,8 @@ class Progress:
     estimate: Estimate
     never_heard: tuple[Quantity, ...]
     lost_lines: int
+    mismatch: Mismatch | None = None
+    alarms: int = 0
     cause: str = ""
 
 
@@ -85,6 +90,8 @@ class LiveLoop:
         )
         self._aligner = Aligner(vehicle.alignment)
         self._estimator = make_estimator(vehicle.estimator)
+        self._watch = MismatchWatch(vehicle.mismatch, vehicle.estimator) if vehicle.mismatch.enabled else None
+        self._alarms = 0
         self._started = clock()
         self._silence = SilenceWatch(vehicle.link.silence, self._started)
         self._measurements: Counter[Quantity] = Counter()
@@ -139,6 +146,8 @@ class LiveLoop:
             estimate=estimate,
             never_heard=tuple(self._silence.never_heard),
             lost_lines=self._journal.lost,
+            mismatch=None if self._watch is None else self._watch.current,
+            alarms=self._alarms,
             cause=self._cause,
         )
 
@@ -161,6 +170,8 @@ class LiveLoop:
 
     def _start_segment(self, measurement: Measurement) -> None:
         self._estimator.forget_rows()
+        if self._watch is not None:
+            self._watch.clear()
         self._published_t_us = None
         restarted = measurement.boot != self._boot
         self._boot = measurement.boot
@@ -173,6 +184,18 @@ class LiveLoop:
         if last is None or sample.t_us - last >= period * 1e6:
             self._published_t_us = sample.t_us
             self._publish(sample.t_us)
+        if self._watch is not None:
+            estimate = self._estimator.estimate() if self._watch.wants_estimate else None
+            mismatch = self._watch.push(sample, estimate)
+            if mismatch is not None:
+                self._raise_alarm(mismatch)
+
+    def _raise_alarm(self, mismatch: Mismatch) -> None:
+        self._alarms += 1
+        self._journal.event("mismatch", mismatch.sentence, asdict(mismatch))
+        self._say(mismatch.sentence)
+        if self._vehicle.publish.enabled:
+            self._source.warn(mismatch.t_us, mismatch.notice, mismatch.values)
 
     def _publish(self, t_us: int) -> None:
         values = published_values(self._estimator.estimate())

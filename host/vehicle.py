@@ -10,6 +10,7 @@ from bridge.mavlink_map import MavlinkMap
 from firmware_model.config import EstimatorConfig
 from host.align import AlignConfig
 from host.csv_map import CsvMap
+from host.mismatch import MismatchConfig
 from host.state import fingerprint
 from host.toml_config import MAY_BE_INFINITE, build, read_toml, shared, to_table, to_toml
 
@@ -85,6 +86,7 @@ class Vehicle:
     can: CanMap = CanMap()
     csv: CsvMap = CsvMap()
     estimator: EstimatorConfig = field(metadata=shared(step="alignment.step", speed="speed"))
+    mismatch: MismatchConfig = MismatchConfig()
     publish: PublishConfig = PublishConfig()
     journal: JournalConfig = JournalConfig()
     state: StateConfig = StateConfig()

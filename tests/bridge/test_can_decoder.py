@@ -123,6 +123,7 @@ def test_default_dbc_as_other_programs_see_it() -> None:
         "ESTIMATE_B1": 436,
         "ESTIMATE_B2": 437,
         "ESTIMATE_U0": 438,
+        "MISMATCH": 439,
     }
 
 

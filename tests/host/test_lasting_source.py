@@ -40,6 +40,11 @@ class Scripted:
         self.counts["ATTITUDE"] += 1
         return [Measurement(quantity=Quantity.PITCH, value=0.0, t_us=0, source="x", boot=self.boots.pop(0))]
 
+    def warn(self, t_us: int, notice: str, values: Mapping[str, float]) -> None:  # noqa: ARG002
+        if not self.boots:
+            raise LinkClosed("unplugged")
+        self.published.append(values["mismatch"])
+
     def publish(self, t_us: int, values: Mapping[str, float]) -> None:  # noqa: ARG002
         if not self.boots:
             raise LinkClosed("unplugged")

@@ -57,6 +57,7 @@ class Script:
         self.counts: Counter[str] = Counter()
         self.notes: list[str] = ["depth_source auto chose SCALED_PRESSURE2"]
         self.published: list[tuple[int, dict[str, float]]] = []
+        self.warned: list[tuple[int, str, dict[str, float]]] = []
 
     def read(self, timeout_s: float) -> list[Measurement]:
         self.time[0] += timeout_s
@@ -70,6 +71,9 @@ class Script:
 
     def publish(self, t_us: int, values: Mapping[str, float]) -> None:
         self.published.append((t_us, dict(values)))
+
+    def warn(self, t_us: int, notice: str, values: Mapping[str, float]) -> None:
+        self.warned.append((t_us, notice, dict(values)))
 
     def close(self) -> None:
         pass

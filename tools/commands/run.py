@@ -155,7 +155,9 @@ def _status_line(progress: Progress) -> str:
     estimate = progress.estimate
     values = "  ".join(_estimated(estimate, name) for name in estimate.values)
     taken = f"{progress.samples.total():6d} samples, {progress.refused.total()} refused"
-    return f"{progress.seconds:6.0f} s  {taken}  {estimate.status.name:11s}  {values}"
+    mismatch = progress.mismatch
+    alarm = f"MISMATCH {mismatch.slot} x{mismatch.ratio:.1f}  " if mismatch is not None else ""
+    return f"{progress.seconds:6.0f} s  {alarm}{taken}  {estimate.status.name:11s}  {values}"
 
 
 def _estimated(estimate: Estimate, name: str) -> str:
@@ -177,6 +179,8 @@ def _summary(end: Progress) -> str:
         f"samples: {samples or 'none'}",
         f"refused: {refused or 'none'}",
     ]
+    if end.alarms:
+        lines.append(f"mismatch: {end.alarms} alarms, the journal says when and where")
     if end.lost_lines:
         lines.append(f"not recorded: {end.lost_lines} lines could not be written")
     for name in end.estimate.values:
