@@ -21,6 +21,7 @@ class Fit:
     noise        (4,) variances of pitch rad^2, depth m^2; densities of unknown heave, pitch acceleration
     wander       variance and correlation time s of the part of each sensor's error, pitch and depth, that
                  wanders (2, 2); zero where all of it is white
+    rivals       parameters of other maxima that are almost as likely
     whitened     innovations over their deviation, (2, N) each, NaN where nothing was measured
     scores       whitened sensitivities of the free parameters, (2, free, N) each, what the initial states
                  could explain taken out
@@ -38,6 +39,7 @@ class Fit:
     iterations: int
     converged: bool
     wander: Array = field(default_factory=lambda: np.zeros((2, 2)))
+    rivals: tuple[Array, ...] = ()
 
     @property
     def has_process_noise(self) -> bool:

@@ -9,12 +9,13 @@ import numpy as np
 
 from host.equations import NAMES
 from host.fit import Fit
+from host.identifiability import ambiguity, open_combinations, undetermined
 from host.identify_car import ESTIMATED, car_least_squares, run_estimator
 from host.maximum_likelihood import fit_maximum_likelihood
 from host.model import VehicleModel, model_of
 from host.predict import Prediction, predict
 from host.recording import Array, Recording
-from host.uncertainty import covariance, undetermined
+from host.uncertainty import covariance
 from host.vehicle import Vehicle
 from host.whiteness import is_white
 
@@ -22,6 +23,7 @@ Method = Literal["car", "mils", "robust", "ml"]
 METHODS: tuple[Method, ...] = ("car", "mils", "robust", "ml")
 SHORTEST_TO_SPLIT = 40.0  # s; below it a held-out part would leave too little to learn from
 HELD_OUT_SHARE = 0.3
+FEWEST_ROWS = 10  # of a stretch to learn from
 UNKNOWN = 1e4  # of a standard deviation in SI: the recording says nothing at all
 
 Progress = Callable[[str], None]
@@ -108,7 +110,8 @@ def _held_out(recordings: list[Recording], vehicle: Vehicle, method: Method) -> 
         learn = [r.between(-np.inf, end) for r, end in zip(recordings, ends, strict=True)]
         test = [r.between(end, np.inf) for r, end in zip(recordings, ends, strict=True)]
     test = [recording for recording in test if _can_predict(recording)]
-    if not test or any(recording.time.size < 50 for recording in learn):
+    learn = [recording for recording in learn if recording.time.size >= FEWEST_ROWS]
+    if not test or sum(recording.time.size for recording in learn) < 50:
         return None
     model, _, _ = _learn(learn, vehicle, method, lambda _: None)
     return [predict(model, recording) for recording in test]
@@ -153,6 +156,12 @@ def _notes(fit: Fit | None, method: Method) -> list[str]:
             "The innovations are still coloured, so something systematic is left over; the deviations are "
             "corrected for it."
         )
+    if fit.has_coloured_noise:
+        notes.append(f"The sensors' errors wander{_wandering(fit)}; the deviations include it.")
+    notes += [
+        combination.sentence for combination in open_combinations(fit.parameters, covariance(fit), fit.free)
+    ]
+    notes += [ambiguity(fit.parameters, rival) for rival in fit.rivals]
     at_bound = [
         parameter.name
         for parameter, value, is_free in zip(fit.structure.parameters, fit.parameters, fit.free, strict=True)
@@ -161,3 +170,12 @@ def _notes(fit: Fit | None, method: Method) -> list[str]:
     if at_bound:
         notes.append(f"At the edge of what is physically possible: {', '.join(at_bound)}.")
     return notes
+
+
+def _wandering(fit: Fit) -> str:
+    scales = (("pitch", "deg", 180.0 / np.pi), ("depth", "cm", 100.0))
+    return "".join(
+        f", {name} by {np.sqrt(variance) * scale:.2g} {unit} over {time:.2g} s"
+        for (name, unit, scale), (variance, time), white in zip(scales, fit.wander, fit.noise, strict=False)
+        if variance > 0.1 * white
+    )

@@ -8,6 +8,7 @@ Identification, ch. 6.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -29,6 +30,9 @@ Start = tuple[Array, list[Array]]
 SMALLEST_NOISE = np.array([1e-12, 1e-10])
 RUNAWAY = 1e7  # of a sensitivity, in SI: the model leaves the recording exponentially
 ANNEALING = (0.1, 0.01, 1e-3, 1e-4)  # s, variance of the unknown force over that of all force
+ALMOST_AS_LIKELY = 3.0  # of a log-likelihood: odds of 20 to 1 and less rule nothing out
+APART = 4.0  # standard deviations between two modes
+NEAR = 0.05  # of a log-likelihood for each value measured: the noise model may still change the order
 NOISE_FREE = 100.0 * SMALLEST_NOISE  # what is left of noise-free data is the integration error
 
 
@@ -70,14 +74,38 @@ def fit_maximum_likelihood(
         on_progress("output error")
         candidates.append(output_error(Point(structure, parameters, initial, np.zeros(4)), inputs, free))
     best = max(candidates, key=lambda fit: fit.log_likelihood)
+    others = [fit for fit in candidates if fit is not best]
     nothing_left = all(is_white(e) for e in best.whitened) or bool((best.noise[:2] < NOISE_FREE).all())
     if noise_model == "output_error" or (noise_model == "auto" and nothing_left):
-        return best
+        return _with_rivals(best, others)
     on_progress("random forces, or sensors that wander")
     filtered = filter_error(best, inputs)
     if noise_model == "filter_error" or (filtered.bic < best.bic and all(map(is_white, filtered.whitened))):
-        return filtered
-    return min((best, filtered, coloured_noise(best, inputs)), key=lambda fit: fit.bic)
+        chosen = filtered
+    else:
+        chosen = min((best, filtered, coloured_noise(best, inputs)), key=lambda fit: fit.bic)
+    if chosen is best:
+        return _with_rivals(best, others)
+    climb = filter_error if chosen is filtered else coloured_noise
+    near = [fit for fit in others if fit.log_likelihood > best.log_likelihood - NEAR * best.samples]
+    return _with_rivals(chosen, [climb(fit, inputs) for fit in near if _are_apart(fit, best)])
+
+
+def _with_rivals(fit: Fit, others: list[Fit]) -> Fit:
+    """The likeliest of all, with the other ends that the recording cannot rule out."""
+    best = max([fit, *others], key=lambda end: end.log_likelihood)
+    rivals: list[Fit] = []
+    for other in sorted([fit, *others], key=lambda end: -end.log_likelihood):
+        is_near = other.log_likelihood > best.log_likelihood - ALMOST_AS_LIKELY
+        if is_near and all(_are_apart(other, known) for known in (best, *rivals)):
+            rivals.append(other)
+    return replace(best, rivals=tuple(rival.parameters for rival in rivals))
+
+
+def _are_apart(one: Fit, other: Fit) -> bool:
+    """Whether two ends are two modes: further apart than the deviations of either."""
+    apart = one.parameters - other.parameters
+    return min(float(apart @ fit.information @ apart) for fit in (one, other)) > APART**2
 
 
 def output_error(

@@ -7,10 +7,11 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, select_autoescape
 
 from host.equations import PARAMETERS
+from host.identifiability import MANOEUVRE
 from host.identify import Identification
 from host.plots import free_run_plot, history_plot, overview_plot, whiteness_plot
 from host.predict import Prediction
-from host.uncertainty import MANOEUVRE
+
 
 TRUSTED_FIT = 80.0  # %, of a free run: below it the values are a description, not a law
 MOST_PLOTS = 4  # a folder of short dives would drown the reader

@@ -1,10 +1,8 @@
-"""What the data really say of the parameters: covariance for coloured residuals, and what cannot be told."""
+"""What the data really say of the parameters: their covariance, for coloured residuals too."""
 
 import numpy as np
 
-from host.equations import NAMES
 from host.fit import Fit
-from host.gauss_newton import Mask
 from host.recording import Array
 from host.whiteness import autocovariance, is_white
 
@@ -57,34 +55,3 @@ def _coloured_information(fit: Fit) -> Array:
             smoothed = np.fft.irfft(transform * spectrum, kernel.size, axis=1)[:, : S.shape[1]]
             B += smoothed @ S.T
     return 0.5 * (B + B.T)
-
-
-def undetermined(parameters: Array, covariance: Array, free: Mask) -> list[str]:
-    """Names of the parameters that the recording leaves open: a 95 % interval as wide as the value itself.
-
-    The plane's heave force and the heave damping count against the depth that pitching gives, for on most
-    vehicles they are small: b1 is known when its share of the steady climb is known to a quarter.
-    """
-    values = dict(zip(NAMES, parameters, strict=True))
-    std = dict(zip(NAMES, np.sqrt(np.diag(covariance)), strict=True))
-    names = [
-        name
-        for name in ("a1", "a2", "a3", "b2", "u0")
-        if free[NAMES.index(name)] and std[name] > 0.5 * abs(values[name])
-    ]
-    climb_by_pitch = abs(values["u0"] * values["b2"] / values["a3"]) if values["a3"] else np.inf
-    if free[NAMES.index("b1")] and std["b1"] / abs(values["a1"]) > 0.25 * climb_by_pitch:
-        names.append("b1")
-    return names
-
-
-HEAVE_STEPS = "plane steps of 1 to 8 s with the depth hold off, so that the plane's own force moves heave"
-MANOEUVRE = {
-    "a1": HEAVE_STEPS,
-    "b1": HEAVE_STEPS,
-    "a2": "quick plane reversals (3-2-1-1) that make the pitch overshoot",
-    "a3": "plane steps held until the pitch settles, at several angles",
-    "b2": "plane steps large against the pitch noise",
-    "u0": "held pitch of both signs for ten seconds or more, or record the speed",
-}
-"""The manoeuvre that shows each parameter."""

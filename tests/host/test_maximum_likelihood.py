@@ -5,9 +5,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from host.equations import NAMES
+from host.identifiability import undetermined
 from host.maximum_likelihood import fit_maximum_likelihood
 from host.propagate import free_run, inputs_of
-from host.uncertainty import covariance, undetermined
+from host.uncertainty import covariance
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 

@@ -1,0 +1,75 @@
+"""What a recording cannot tell is said, by name, with the manoeuvre that tells it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from exact_dive import TABLE_1, Dive, fly
+
+from host.equations import NAMES
+from host.identifiability import open_combinations, undetermined
+from host.identify import identify
+from host.maximum_likelihood import fit_maximum_likelihood
+from host.recording import Array, Recording
+from host.uncertainty import covariance
+from host.vehicle import default_vehicle
+
+
+def slow_swing(time: Array) -> Array:
+    """A plane so slow that pitch is always settled: only the gain b2 / a3 shows."""
+    return 0.25 * np.sin(2.0 * np.pi * time / 40.0)
+
+
+def quick_reversals(time: Array) -> Array:
+    """3-2-1-1 of 1 s, over and over."""
+    return 0.25 * np.where(np.isin(time.astype(int) % 7, (0, 1, 2, 5)), 1.0, -1.0)
+
+
+def flown(plane: Callable[[Array], Array], monkeypatch) -> Recording:  # type: ignore[no-untyped-def]
+    monkeypatch.setattr(
+        "exact_dive.multistep", lambda _rng, rows, step, _amplitude: plane(np.arange(rows) * step)
+    )
+    return fly(Dive())[0]
+
+
+def test_a_slow_plane_shows_only_a_combination_and_quick_reversals_show_the_rest(monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    slow = flown(slow_swing, monkeypatch)
+    fit = fit_maximum_likelihood([slow])
+    (combination,) = open_combinations(fit.parameters, covariance(fit), fit.free)
+    assert set(combination.change) == {"a2", "a3", "b2"}
+    assert set(combination.change) == set(undetermined(fit.parameters, covariance(fit), fit.free))
+    assert "3-2-1-1" in combination.manoeuvre
+    # Along it the gain b2 / a3 stays: both change by the same share.
+    share = {name: combination.change[name] / fit.parameters[NAMES.index(name)] for name in ("a3", "b2")}
+    assert abs(share["a3"] / share["b2"] - 1.0) < 0.1
+    both = fit_maximum_likelihood([slow, flown(quick_reversals, monkeypatch)])
+    assert open_combinations(both.parameters, covariance(both), both.free) == []
+    assert undetermined(both.parameters, covariance(both), both.free) == []
+
+
+def test_heave_damping_and_plane_force_are_named_together_after_a_short_dive() -> None:
+    result = identify([fly(Dive(duration=8.0))[0]], default_vehicle())
+    assert {"a1", "b1"} <= set(result.undetermined)
+    assert any(note.startswith("b1 and a1 are known only together") for note in result.notes)
+
+
+def test_a_good_dive_leaves_no_combination_open() -> None:
+    result = identify([fly(Dive())[0]], default_vehicle())
+    assert not any("known only together" in note or "Two answers" in note for note in result.notes)
+
+
+def test_two_valleys_are_told() -> None:
+    """Little motion under much noise: a slow hull that climbs by its planes, or a fast one that pitches."""
+    dive = Dive(seed=7, duration=40.0, amplitude=0.1, pitch_noise=0.01, depth_noise=0.05)
+    result = identify([fly(dive)[0]], default_vehicle())
+    assert result.fit is not None
+    (rival,) = result.fit.rivals
+    (note,) = [note for note in result.notes if note.startswith("Two answers")]
+    assert "u0" in note
+    # The other answer is a maximum as well: begun there, the search stays and ends almost as likely.
+    again = fit_maximum_likelihood([fly(dive)[0]], starts=[(rival, result.fit.initial)])
+    assert np.allclose(again.parameters[:6], rival[:6], rtol=0.1)
+    assert abs(again.log_likelihood - result.fit.log_likelihood) < 3.0
+    more = fit_maximum_likelihood([fly(replace(dive, amplitude=0.25, duration=120.0))[0]])
+    assert more.rivals == ()
+    assert abs(more.parameters[5] / TABLE_1["u0"] - 1.0) < 0.3
