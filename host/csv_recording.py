@@ -59,6 +59,7 @@ def read_csv_recording(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEE
         speed=values["speed"],
         pitch_rate=values["pitch_rate"],
         step=step,
+        has_angle=columns.rudder.unit != "raw" or columns.rudder.scale != 1.0,
         counts=counts,
     )
     pieces = split_at_gaps(whole, max(1.0, 2.5 * step), needs)

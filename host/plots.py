@@ -56,11 +56,17 @@ def free_run_plot(prediction: Prediction) -> str:
         rest.set_ylabel("left over")
     axes[0].invert_yaxis()
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False, ncols=2, markerscale=3)
-    axes[4].step(recording.time, np.degrees(recording.rudder), where="post", color=RUDDER, linewidth=0.9)
-    axes[4].set_ylabel("plane, deg")
+    plane_trace(axes[4], recording)
     axes[4].set_xlabel("time, s")
     figure.align_ylabels()
     return data_uri(figure)
+
+
+def plane_trace(axis: Any, recording: Recording) -> None:
+    """The plane in degrees, or another actuator as it was recorded."""
+    angle = np.degrees(recording.rudder) if recording.has_angle else recording.rudder
+    axis.step(recording.time, angle, where="post", color=RUDDER, linewidth=0.9)
+    axis.set_ylabel("plane, deg" if recording.has_angle else "actuator,\nas recorded")
 
 
 def whiteness_plot(innovations: Array, step: float) -> str:
@@ -71,6 +77,8 @@ def whiteness_plot(innovations: Array, step: float) -> str:
         if np.isfinite(values).sum() < 3:
             continue
         covariance, pairs = autocovariance(values, lags)
+        if not covariance[0] > 0.0:
+            continue
         band = 1.96 / np.sqrt(np.maximum(pairs, 1.0))
         seconds = np.arange(1, lags + 1) * step
         axis.fill_between(seconds, -band[1:], band[1:], color="#e3edf4")
@@ -99,8 +107,8 @@ def overview_plot(recording: Recording) -> str:
     axes[0].plot(recording.time, recording.depth, ".", color=MEASURED, markersize=2.5)
     axes[0].invert_yaxis()
     axes[1].plot(recording.time, np.degrees(recording.pitch), ".", color=MEASURED, markersize=2.5)
-    axes[2].step(recording.time, np.degrees(recording.rudder), where="post", color=RUDDER, linewidth=0.9)
-    for axis, label in zip(axes, ("depth, m", "pitch, deg", "plane, deg"), strict=True):
-        axis.set_ylabel(label)
+    axes[0].set_ylabel("depth, m")
+    axes[1].set_ylabel("pitch, deg")
+    plane_trace(axes[2], recording)
     axes[2].set_xlabel("time, s")
     return data_uri(figure)

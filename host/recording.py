@@ -23,6 +23,7 @@ class Recording:
     speed       m/s through the water; all NaN where the vehicle has no speed sensor
     pitch_rate  rad/s; all NaN where it is not recorded
     step        s, nominal interval
+    has_angle   whether rudder is an angle in rad; False for another actuator in a unit of its own
     counts      what was refused in the whole file, by cause
     notes       what was lost or decided on the user's behalf while the file was read, one sentence each
     """
@@ -36,6 +37,7 @@ class Recording:
     speed: Array
     pitch_rate: Array
     step: float
+    has_angle: bool = True
     counts: Counter[str] = field(default_factory=Counter)
     notes: tuple[str, ...] = ()
 

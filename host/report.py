@@ -1,5 +1,6 @@
 """The identification report: one self-contained HTML page a person understands by looking."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +10,18 @@ from jinja2 import Environment, FileSystemLoader, select_autoescape
 from host.equations import PARAMETERS
 from host.identifiability import MANOEUVRE
 from host.identify import Identification
+from host.model import UNITS
 from host.plots import free_run_plot, history_plot, overview_plot, whiteness_plot
 from host.predict import Prediction
+from host.recording import Recording
+from host.verdict import verdict
 
-
-TRUSTED_FIT = 80.0  # %, of a free run: below it the values are a description, not a law
 MOST_PLOTS = 4  # a folder of short dives would drown the reader
 
 
 def write_report(result: Identification, path: Path) -> None:
     """Writes report.html."""
+    found = verdict(result)
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent), autoescape=select_autoescape(["j2", "html"])
     )
@@ -29,8 +32,8 @@ def write_report(result: Identification, path: Path) -> None:
         files=[file["name"] for file in result.model.provenance["recordings"]],
         duration=sum(recording.duration for recording in result.recordings),
         undetermined=result.undetermined,
-        verdict=verdict(result),
-        trusted=not verdict(result).startswith("The linear model does not"),
+        verdict=re.sub("`(.+?)`", r"<code>\1</code>", found.sentence),
+        trusted=found.is_trusted,
         notes=result.notes,
         parameters=_parameters(result),
         advice=advice(result),
@@ -42,35 +45,6 @@ def write_report(result: Identification, path: Path) -> None:
     path.write_text(page, encoding="utf-8")
 
 
-def verdict(result: Identification) -> str:
-    """The one sentence that answers "can I trust this model?"."""
-    if result.undetermined:
-        return (
-            f"This recording does not tell {_listed(result.undetermined)}: "
-            "another manoeuvre is needed before those values mean anything."
-        )
-    if result.fit is None:
-        known = "The regression gave all five coefficients"
-    else:
-        known = "All parameters are determined"
-    scored = result.held_out if result.held_out is not None else result.predictions
-    if not scored:
-        return f"{known}, but no stretch could be free-run to check them."
-    depth = np.mean([p.score.depth_fit_percent for p in scored])
-    pitch = np.mean([p.score.pitch_fit_percent for p in scored])
-    bent = [note for note in result.notes if note.startswith(("At the edge", "The search stopped"))]
-    if bent or min(depth, pitch) < TRUSTED_FIT:
-        return (
-            f"The linear model does not carry this recording: running freely it reproduces {depth:.1f} % of "
-            f"the depth and {pitch:.1f} % of the pitch motion. `mils diagnose` says what is missing."
-        )
-    seen = "data it never saw" if result.held_out is not None else "the data it was learnt from"
-    return (
-        f"{known}. Running freely over {seen}, the model "
-        f"reproduces {depth:.1f} % of the depth and {pitch:.1f} % of the pitch motion."
-    )
-
-
 def advice(result: Identification) -> list[str]:
     """One line for each manoeuvre that would show an open parameter."""
     lines: dict[str, list[str]] = {}
@@ -79,8 +53,11 @@ def advice(result: Identification) -> list[str]:
     return [f"{', '.join(names)}: {manoeuvre}" for manoeuvre, names in lines.items()]
 
 
-def _listed(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+def unit_of(name: str, recordings: list[Recording]) -> str:
+    """SI unit of a parameter; b1 and b2 are per unit of the actuator where that is no angle."""
+    if all(recording.has_angle for recording in recordings):
+        return UNITS[name]
+    return {"b1": "m/s^2/actuator unit", "b2": "rad/s^2/actuator unit"}.get(name, UNITS[name])
 
 
 def _parameters(result: Identification) -> list[dict[str, Any]]:
@@ -92,7 +69,7 @@ def _parameters(result: Identification) -> list[dict[str, Any]]:
             {
                 "name": parameter.name,
                 "meaning": parameter.meaning,
-                "unit": parameter.unit,
+                "unit": unit_of(parameter.name, result.recordings),
                 "value": f"{value:.4g}" if is_known else "not found",
                 "std": _deviation(std, is_known),
                 "interval": f"{value - 1.96 * std:.4g} to {value + 1.96 * std:.4g}"
@@ -113,9 +90,10 @@ def _deviation(std: float, is_known: bool) -> str:
 
 
 def _scores(result: Identification) -> list[dict[str, Any]]:
-    groups: list[tuple[str, list[Prediction]]] = [("learnt from", result.predictions)]
-    if result.held_out is not None:
-        groups.append(("held out", result.held_out))
+    groups: list[tuple[str, list[Prediction]]] = [
+        ("held out", result.held_out or []),
+        ("learnt from", result.predictions),
+    ]
     return [
         {
             "name": f"{prediction.recording.name}, {kind}",

@@ -34,7 +34,8 @@ def run(args: argparse.Namespace) -> int:
     require_bench()
     from host.identify import identify
     from host.model import write_model
-    from host.report import advice, verdict, write_report
+    from host.report import advice, unit_of, write_report
+    from host.verdict import verdict
 
     vehicle = load_vehicle(args.vehicle)
     worst = 0
@@ -46,9 +47,9 @@ def run(args: argparse.Namespace) -> int:
             write_model(result.model, folder / "model.json")
             say("writing the report")
             write_report(result, folder / "report.html")
-            print(verdict(result))
+            print(verdict(result).sentence)
             for name, value in result.model.values.items():
-                std, unit = result.model.std[name], result.model.units[name]
+                std, unit = result.model.std[name], unit_of(name, recordings)
                 print(
                     f"  {name:13s} {value:+10.5f} +- {std:.5f} {unit}"
                     if std
