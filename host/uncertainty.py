@@ -4,7 +4,7 @@ import numpy as np
 
 from host.fit import Fit
 from host.recording import Array
-from host.whiteness import autocovariance, is_white
+from host.whiteness import crosscovariance, is_white
 
 LONGEST_CORRELATION = 0.1  # of a recording's rows: beyond it autocovariances are mostly noise
 
@@ -13,8 +13,8 @@ def covariance(fit: Fit) -> Array:
     """Covariance (8, 8) of the parameters; zero for held ones.
 
     White innovations: the inverse Fisher information M^-1. Coloured ones: M^-1 B M^-1 with
-    B = sum_k sum_l s_k R(k - l) s_l^T from the innovations' own autocovariance R (Grauer and Morelli,
-    J. Aircraft 52(3), 2015), without which deviations come out several times too small.
+    B = sum_k sum_l s_k R(k - l) s_l^T from the innovations' own auto- and crosscovariances R (Grauer and
+    Morelli, J. Aircraft 52(3), 2015), without which deviations come out several times too small.
     """
     free = fit.free
     M = fit.information[np.ix_(free, free)]
@@ -36,22 +36,27 @@ def _safe_inverse(M: Array) -> Array:
 
 
 def _coloured_information(fit: Fit) -> Array:
+    """B, by the 2 x 2 spectrum of each recording's innovations, smoothed by Parzen's window."""
     count = int(fit.free.sum())
     B = np.zeros((count, count))
     for white, scores in zip(fit.whitened, fit.scores, strict=True):
-        lags = max(1, int(LONGEST_CORRELATION * white.shape[1]))
-        for e, S in zip(white, scores, strict=True):
-            if np.isfinite(e).sum() < 2:
-                continue
-            R, _ = autocovariance(e, lags)
-            # Parzen's window keeps the sum positive definite.
-            x = np.arange(lags + 1) / lags
-            window = np.where(x <= 0.5, 1.0 - 6.0 * x**2 * (1.0 - x), 2.0 * (1.0 - x) ** 3)
-            kernel = np.concatenate(
-                [R * window, np.zeros(2 * S.shape[1] - 2 * lags - 1), (R * window)[:0:-1]]
-            )
-            spectrum = np.maximum(np.fft.rfft(kernel).real, 0.0)
-            transform = np.fft.rfft(S, kernel.size, axis=1)
-            smoothed = np.fft.irfft(transform * spectrum, kernel.size, axis=1)[:, : S.shape[1]]
-            B += smoothed @ S.T
+        rows = white.shape[1]
+        lags = max(1, int(LONGEST_CORRELATION * rows))
+        x = np.arange(lags + 1) / lags
+        window = np.where(x <= 0.5, 1.0 - 6.0 * x**2 * (1.0 - x), 2.0 * (1.0 - x) ** 3)
+        length = 2 * rows
+        spectrum = np.empty((length // 2 + 1, 2, 2), dtype=complex)
+        for i in range(2):
+            for j in range(2):
+                ahead, behind = (
+                    crosscovariance(white[a], white[b], lags) * window for a, b in ((i, j), (j, i))
+                )
+                kernel = np.concatenate([ahead, np.zeros(length - 2 * lags - 1), behind[:0:-1]])
+                spectrum[:, i, j] = np.fft.rfft(kernel)
+        # Samples that are missing can leave a spectrum that is not positive: such a part is no noise.
+        values, vectors = np.linalg.eigh(0.5 * (spectrum + spectrum.conj().transpose(0, 2, 1)))
+        spectrum = (vectors * np.maximum(values, 0.0)[:, None, :]) @ vectors.conj().transpose(0, 2, 1)
+        transform = np.fft.rfft(scores, length, axis=2)
+        smoothed = np.fft.irfft(np.einsum("fij,jpf->ipf", spectrum, transform), length, axis=2)
+        B += np.einsum("ipk,iqk->pq", smoothed[:, :, :rows], scores)
     return 0.5 * (B + B.T)

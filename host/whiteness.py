@@ -17,6 +17,21 @@ def autocovariance(values: Array, lags: int) -> tuple[Array, Array]:
     return sums / np.maximum(pairs, 1.0), pairs
 
 
+def crosscovariance(first: Array, second: Array, lags: int) -> Array:
+    """Covariance of first(k + l) with second(k), l = 0..lags, over the pairs in which neither is NaN."""
+    length = 2 * first.size
+
+    def transforms(values: Array) -> tuple[Array, Array]:
+        present = np.isfinite(values)
+        mean = values[present].mean() if present.any() else 0.0
+        return np.fft.rfft(np.where(present, values - mean, 0.0), length), np.fft.rfft(present * 1.0, length)
+
+    (one, seen), (other, both) = transforms(first), transforms(second)
+    sums = np.fft.irfft(one * other.conj(), length)[: lags + 1]
+    pairs = np.rint(np.fft.irfft(seen * both.conj(), length)[: lags + 1])
+    return np.asarray(sums / np.maximum(pairs, 1.0))
+
+
 def is_white(innovations: Array, lags: int = 20, significance: float = 0.001) -> bool:
     """Box-Pierce test on each row of (outputs, N) innovations, each lag weighted by its number of pairs."""
     for values in innovations:

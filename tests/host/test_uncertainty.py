@@ -4,7 +4,7 @@ from scipy.signal import lfilter
 
 from host.maximum_likelihood import fit_maximum_likelihood
 from host.uncertainty import covariance
-from host.whiteness import autocovariance, is_white
+from host.whiteness import autocovariance, crosscovariance, is_white
 
 
 def test_white_noise_is_white_and_filtered_noise_is_not() -> None:
@@ -47,3 +47,15 @@ def test_coloured_sensor_noise_widens_the_deviations() -> None:
     error = np.abs(fit.parameters[:6] - np.array(list(TABLE_1.values())))
     assert (error < 4.0 * std[:6]).all()
     assert std[0] > 1.5 * np.sqrt(naive[0, 0])
+
+
+def test_crosscovariance_equals_its_definition() -> None:
+    one, other = np.array([1.0, -2.0, np.nan, 0.5, 3.0]), np.array([0.5, 1.0, 2.0, np.nan, -1.0])
+    x, y = one - np.nanmean(one), other - np.nanmean(other)
+    got = crosscovariance(one, other, 2)
+    expected = [
+        np.mean([x[0] * y[0], x[1] * y[1], x[4] * y[4]]),
+        np.mean([x[1] * y[0], x[3] * y[2]]),
+        np.mean([x[3] * y[1], x[4] * y[2]]),
+    ]
+    assert np.allclose(got, expected)
