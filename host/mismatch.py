@@ -45,6 +45,8 @@ LEVEL_WINDOWS = 60  # windows that set the units in which a channel's errors cou
 SUSPICIOUS = 0.5  # of the threshold: from here on the reference is kept as it is
 NO_WORSE = 1.2  # ratio of prediction errors up to which a new snapshot is as good as the reference
 EXPLAINED = 0.2  # share of the excess error that a change must explain to be named
+AS_GOOD = 0.85  # of what the best change explains: one of another slot that explains more is as good
+PATIENCE = 10  # windows for which an alarm waits for its slot to become clear
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,6 +83,7 @@ class Mismatch:
     t_us      when it was raised, vehicle clock
     slot      where in the chain, one of `SLOTS`
     change    the simple change that explains most of it; "" for slot unknown
+    others    slots of changes that explain it about as well
     channel   "pitch" or "depth", whose prediction error grew more
     ratio     its prediction error over the level before
     explained share of the excess error that the change explains
@@ -89,6 +92,7 @@ class Mismatch:
     t_us: int
     slot: str
     change: str
+    others: tuple[str, ...]
     channel: str
     ratio: float
     explained: float
@@ -97,7 +101,7 @@ class Mismatch:
     def sentence(self) -> str:
         return (
             f"the vehicle no longer moves as predicted: {self.channel} error x{self.ratio:.1f}; "
-            f"slot {self.slot}: {SENTENCES[self.slot]}"
+            f"slot {' or '.join((self.slot, *self.others))}: {SENTENCES[self.slot]}"
         )
 
     @property
@@ -132,24 +136,29 @@ class MismatchWatch:
         self._fixed = None if config.model is None else read_reference(config.model)
         self._window = PredictionWindow(max(10, round(horizon / step)), step)
         self._history = PredictionHistory(max(self._settling, round(config.memory / step / self._every)))
-        self._recent: deque[tuple[Comparison, Array]] = deque(maxlen=config.persistence)
+        self._recent: deque[tuple[Comparison, Array]] = deque(maxlen=config.persistence + PATIENCE)
         self._samples = 0
         self._begin()
 
     def _begin(self) -> None:
         """Knows nothing: first the units of the errors are learnt, then what is usual."""
-        self._reference = self._fixed
+        self.reference = self._fixed
+        """What is predicted with; None before anything is known."""
         self._candidate: Reference | None = None
         self._is_suspicious = False
         self._levels = self._floor
         self._first_errors: list[Array] = []
         self._history.clear()
+        self._forget_recent()
+
+    def _forget_recent(self) -> None:
         self._recent.clear()
+        self._waited = 0
 
     def clear(self) -> None:
         """Joins nothing across this moment: the vehicle rebooted, or its clock started anew."""
         self._window.clear()
-        self._recent.clear()
+        self._forget_recent()
 
     @property
     def wants_estimate(self) -> bool:
@@ -163,9 +172,9 @@ class MismatchWatch:
         if estimate is not None:
             self._take(estimate)
         is_due = self._samples % self._every == 0 and self._window.is_full
-        if self._reference is None or not is_due or not self._window.moves(2.0 * self._floor):
+        if self.reference is None or not is_due or not self._window.moves(2.0 * self._floor):
             return None
-        found = self._window.compare(self._reference, self._levels)
+        found = self._window.compare(self.reference, self._levels)
         if len(self._first_errors) < LEVEL_WINDOWS:
             self._first_errors.append(found.errors)
             if len(self._first_errors) == LEVEL_WINDOWS:
@@ -180,33 +189,38 @@ class MismatchWatch:
             snapshot, self._candidate = None, None
         earlier, self._candidate = self._candidate, snapshot
         self._is_suspicious = False
-        if self._reference is None or earlier is None:
-            self._reference = self._reference or earlier
+        if self.reference is None or earlier is None:
+            self.reference = self.reference or earlier
         elif self._window.is_full:
-            before = self._window.compare(self._reference, self._levels).errors
+            before = self._window.compare(self.reference, self._levels).errors
             after = self._window.compare(earlier, self._levels).errors
             if (after <= NO_WORSE * before).all():
-                self._reference = earlier
+                self.reference = earlier
 
     def _judge(self, found: Comparison, t_us: int) -> Mismatch | None:
         past = self._history.like(found)
         self._history.add(found)
         if past is None:
-            self._recent.clear()
+            self._forget_recent()
             return None
         self._recent.append((found, past.deviations(found)))
         if len(self._recent) < self._config.persistence:
             return None
-        highest = float(np.abs(np.mean([deviations for _, deviations in self._recent], axis=0)).max())
+        latest = list(self._recent)[-self._config.persistence :]
+        highest = float(np.abs(np.mean([deviations for _, deviations in latest], axis=0)).max())
         self._is_suspicious |= highest > SUSPICIOUS * self._config.threshold
         if self._history.size < self._settling:
             return None
         self.current = None
-        if highest <= self._config.threshold:
+        if highest <= self._config.threshold and not self._waited:
             return None
-        self.current = _explained([comparison for comparison, _ in self._recent], past, t_us)
+        self._waited += 1
+        alarm = _explained([comparison for comparison, _ in self._recent], past, t_us)
+        if alarm.others and self._waited < PATIENCE:
+            return None
         self._begin()
-        return self.current
+        self.current = alarm
+        return alarm
 
 
 def _explained(recent: list[Comparison], past: Past, t_us: int) -> Mismatch:
@@ -221,15 +235,18 @@ def _explained(recent: list[Comparison], past: Past, t_us: int) -> Mismatch:
     gains = (leverage * news).sum(axis=0) ** 2 / (leverage**2).sum(axis=0)
     errors = np.sqrt(np.mean([each.errors**2 for each in recent], axis=0))
     ratios = errors / past.errors
+    slots = [CHANGES[name] for name in NAMES]
     excess = sum(float(each.squares) for each in recent) - len(recent) * past.squares
     best = int(np.argmax(gains))
     explained = min(float(gains[best]) / max(excess, 1e-9), 1.0)
     is_named = explained >= EXPLAINED
+    as_good = {slot: None for slot, gain in zip(slots, gains, strict=True) if gain > AS_GOOD * gains[best]}
     worse = int(np.argmax(ratios))
     return Mismatch(
         t_us=t_us,
-        slot=CHANGES[NAMES[best]] if is_named else "unknown",
+        slot=slots[best] if is_named else "unknown",
         change=NAMES[best] if is_named else "",
+        others=tuple(slot for slot in as_good if is_named and slot != slots[best]),
         channel=("pitch", "depth")[worse],
         ratio=float(ratios[worse]),
         explained=explained,

@@ -11,6 +11,8 @@ SMALLEST = 60  # windows that judge; where fewer moved as much, the most active 
 SIMILAR = 0.8  # of the present activity: the least that counts as moving as much
 HELD_BACK = 60  # windows that are not yet history: the beginning of a fault must not set its own level
 SPREAD_FLOOR = 0.1  # of a channel's level: the least spread of its error
+OVERLAP = 10.0  # windows that share their samples, and count as one
+CAUTION = 4.0  # over the number of separate windows: by so much more is the spread that few of them show
 EVIDENCE_FLOOR = 1.0  # least spread of an evidence: that of white noise
 
 DETECTING = ("heave_force", "pitch_moment", "plane_force")
@@ -37,7 +39,8 @@ class Past:
         usual = np.median(rows, axis=0)
         spread = 1.4826 * np.median(np.abs(rows - usual), axis=0)
         spread = np.maximum(spread, [*(SPREAD_FLOOR * usual[:2]), *[EVIDENCE_FLOOR] * len(DETECTING)])
-        deviation: Array = (_row(found)[_DETECTING] - self.stretch * usual) / (self.stretch * spread)
+        spread *= self.stretch * (1.0 + CAUTION * OVERLAP / len(rows))
+        deviation: Array = (_row(found)[_DETECTING] - self.stretch * usual) / spread
         deviation[:2] = np.maximum(deviation[:2], 0.0)
         return deviation
 
