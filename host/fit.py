@@ -21,6 +21,7 @@ class Fit:
     noise        (4,) variances of pitch rad^2, depth m^2; densities of unknown heave, pitch acceleration
     wander       variance and correlation time s of the part of each sensor's error, pitch and depth, that
                  wanders (2, 2); zero where all of it is white
+    waves        frequency rad/s and damping ratio of the random forces, (2,); zero where they are white
     rivals       parameters of other maxima that are almost as likely
     whitened     innovations over their deviation, (2, N) each, NaN where nothing was measured
     scores       whitened sensitivities of the free parameters, (2, free, N) each, what the initial states
@@ -39,6 +40,7 @@ class Fit:
     iterations: int
     converged: bool
     wander: Array = field(default_factory=lambda: np.zeros((2, 2)))
+    waves: Array = field(default_factory=lambda: np.zeros(2))
     rivals: tuple[Array, ...] = ()
 
     @property
@@ -52,7 +54,9 @@ class Fit:
     @property
     def noise_levels(self) -> int:
         """How many numbers describe the noise."""
-        return 4 if self.has_process_noise else 6 if self.has_coloured_noise else 2
+        if self.has_process_noise:
+            return 6 if self.waves.any() else 4
+        return 6 if self.has_coloured_noise else 2
 
     @property
     def bic(self) -> float:

@@ -6,6 +6,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 
+from host.equations import Structure
 from host.propagate import Form, Inputs, form_of, over_rows, start_of
 from host.recording import Array
 
@@ -32,7 +33,10 @@ def _kalman(form: Form) -> ca.Function:
     after = form.step(before, p, drive)
     A = ca.Function("A", [before, p, drive], [after, ca.jacobian(after, before)])
     x_next, Ax = A(updated, p, drive)
-    Q = ca.diag(ca.vertcat(noise[2], noise[3], ca.SX(form.nx - 2, 1))) * drive[3]
+    density = ca.SX(form.nx, 1)
+    for state, level in zip(_shaken(form.structure), ca.vertsplit(noise[2:]), strict=True):
+        density[form.structure.states.index(state)] = level
+    Q = ca.diag(density) * drive[3]
     P_next = Ax @ (P_updated + Q / 2) @ Ax.T + Q / 2
     carried = ca.vertcat(x, _of_lower(P, lower))
     carried_next = ca.vertcat(x_next, _of_lower(P_next, lower))
@@ -40,6 +44,12 @@ def _kalman(form: Form) -> ca.Function:
     result = ca.vertcat(error, S[0, 0], S[0, 1], S[1, 1], ca.vec(K), x)
     carried_next, result = ca.cse([carried_next, result])
     return ca.Function("kalman", [carried, per_step, ca.vertcat(p, noise)], [carried_next, result])
+
+
+def _shaken(structure: Structure) -> tuple[str, str]:
+    """The two states that white noise drives: the waves' where there are any, else the vehicle's own."""
+    waves = ("heave_wave_rate", "pitch_wave_rate")
+    return waves if set(waves) <= set(structure.states) else ("w", "q")
 
 
 def _of_lower(matrix: ca.SX, lower: ca.Sparsity) -> ca.SX:
@@ -63,15 +73,20 @@ class KalmanPass:
     states: Array
 
 
-def kalman_pass(parameters: Array, initial: Array, noise: Array, inputs: Inputs) -> KalmanPass:
+def kalman_pass(
+    parameters: Array, initial: Array, noise: Array, inputs: Inputs, spread: Array | None = None
+) -> KalmanPass:
     """Runs the Kalman filter over a recording, from an initial state taken as exact.
 
+    spread  (nx,) variances of the states at the first row, where some are not exact
     noise  (4,) variances of pitch (rad^2) and depth (m^2), spectral densities of the unknown heave
            acceleration ((m/s^2)^2 s) and pitch acceleration ((rad/s^2)^2 s)
     """
     form, rows = form_of(inputs), inputs.drive.shape[1]
     start, _ = start_of(form, parameters, initial, inputs)
-    carried = np.concatenate([start, np.zeros(form.nx * (form.nx + 1) // 2)])
+    lower = np.tri(form.nx, dtype=bool).T  # column by column, as CasADi keeps it
+    P = np.diag(spread if spread is not None else np.zeros(form.nx))
+    carried = np.concatenate([start, P[lower]])
     per_step = np.vstack([inputs.drive, inputs.measured, inputs.present])
     table = over_rows(_kalman, form, rows)(carried, per_step, np.concatenate([parameters, noise]))
     split = 5 + 2 * form.nx

@@ -2,12 +2,12 @@
 
 Minimises -log L = 1/2 sum_k [log det S_k + e_k^T S_k^-1 e_k] over the parameters, the initial state of each
 recording and the noise levels. In output error the model runs freely and S is the sensors' noise; in filter
-error (host.filter_error) a Kalman filter gives e and S; where the sensors' errors wander, a filter in each
-sensor does (host.coloured_noise). Source: Maine and Iliff, NASA RP-1138; Klein and Morelli, Aircraft System
-Identification, ch. 6.
+error (host.filter_error, host.wave_forces) a Kalman filter gives e and S; where the sensors' errors wander,
+a filter in each sensor does (host.coloured_noise). Source: Maine and Iliff, NASA RP-1138; Klein and Morelli,
+Aircraft System Identification, ch. 6.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Literal
 
@@ -21,6 +21,7 @@ from host.gauss_newton import GaussNewton, Mask, Point, whiten
 from host.propagate import Inputs, free_run, innovations, inputs_of
 from host.recording import Array, Recording
 from host.start_values import start_values
+from host.wave_forces import wave_forces
 from host.whiteness import is_white
 
 NoiseModel = Literal["auto", "output_error", "filter_error"]
@@ -49,8 +50,8 @@ def fit_maximum_likelihood(
 
     held  values of parameters by name that are not to be estimated. Where the recordings carry measured
           speed, u0 is held at its mean: speed and depth together leave it no freedom.
-    noise_model  "auto": where the free run's residuals are not white, random forces or sensors that wander,
-                 or neither, whichever has the least BIC
+    noise_model  "auto": where the free run's residuals are not white, random forces, sensors that
+                 wander or waves, or none of them, whichever has the least BIC
     starts  (parameters, initial states of each recording); by default found for the base equations,
             with the effects' own parameters at their first probe
     """
@@ -78,17 +79,34 @@ def fit_maximum_likelihood(
     nothing_left = all(is_white(e) for e in best.whitened) or bool((best.noise[:2] < NOISE_FREE).all())
     if noise_model == "output_error" or (noise_model == "auto" and nothing_left):
         return _with_rivals(best, others)
-    on_progress("random forces, or sensors that wander")
-    filtered = filter_error(best, inputs)
-    if noise_model == "filter_error" or (filtered.bic < best.bic and all(map(is_white, filtered.whitened))):
-        chosen = filtered
+    on_progress("random forces, wandering sensors, waves")
+    if noise_model == "filter_error":
+        chosen = filter_error(best, inputs)
     else:
-        chosen = min((best, filtered, coloured_noise(best, inputs)), key=lambda fit: fit.bic)
-    if chosen is best:
-        return _with_rivals(best, others)
-    climb = filter_error if chosen is filtered else coloured_noise
+        chosen = best
+        for fit in _noise_models(best, inputs):
+            chosen = min(chosen, fit, key=lambda fit: fit.bic)
+            if chosen is fit and all(is_white(e) for e in fit.whitened):
+                break
     near = [fit for fit in others if fit.log_likelihood > best.log_likelihood - NEAR * best.samples]
-    return _with_rivals(chosen, [climb(fit, inputs) for fit in near if _are_apart(fit, best)])
+    return _with_rivals(chosen, [_like(chosen, fit, inputs) for fit in near if _are_apart(fit, best)])
+
+
+def _noise_models(start: Fit, inputs: list[Inputs]) -> Iterator[Fit]:
+    """The fits that explain coloured residuals, the likelier and cheaper kinds first."""
+    filtered = filter_error(start, inputs)
+    yield filtered
+    yield coloured_noise(start, inputs)
+    yield wave_forces(filtered, inputs)
+
+
+def _like(chosen: Fit, start: Fit, inputs: list[Inputs]) -> Fit:
+    """Another end under the noise model that was chosen."""
+    if chosen.waves.any():
+        return wave_forces(filter_error(start, inputs), inputs)
+    if chosen.has_process_noise:
+        return filter_error(start, inputs)
+    return coloured_noise(start, inputs) if chosen.has_coloured_noise else start
 
 
 def _with_rivals(fit: Fit, others: list[Fit]) -> Fit:

@@ -1,6 +1,7 @@
 """Whiteness of innovations: what remains after a model that leaves nothing out is white."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from host.recording import Array
@@ -21,7 +22,7 @@ def crosscovariance(first: Array, second: Array, lags: int) -> Array:
     """Covariance of first(k + l) with second(k), l = 0..lags, over the pairs in which neither is NaN."""
     length = 2 * first.size
 
-    def transforms(values: Array) -> tuple[Array, Array]:
+    def transforms(values: Array) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
         present = np.isfinite(values)
         mean = values[present].mean() if present.any() else 0.0
         return np.fft.rfft(np.where(present, values - mean, 0.0), length), np.fft.rfft(present * 1.0, length)

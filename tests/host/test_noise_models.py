@@ -88,3 +88,30 @@ def test_no_noise_level_can_be_moved_uphill(which: str) -> None:
             assert (
                 place(point.with_noise(moved), model).likelihood < top + 0.1
             )  # what the last step may leave
+
+
+def test_waves_are_found_with_their_frequency_and_bias_nothing() -> None:
+    recording, _ = fly(Dive(duration=150.0))
+    rng = np.random.default_rng(8)
+    radius, frequency = np.exp(-0.1 * 1.2 * 0.1), 1.2
+    swing = [1.0, -2.0 * radius * np.cos(frequency * 0.1), radius**2]
+    waves = np.array([np.asarray(lfilter([1.0], swing, rng.standard_normal(2100)))[600:] for _ in range(2)])
+    waves *= 0.02 / waves.std(axis=1, keepdims=True)
+    a1, a2, a3, _, _, u0 = TABLE_1.values()
+    w = q = theta = zeta = 0.0
+    for k in range(1500):  # the motion that the waves add; small steps, for the hull is linear
+        recording.pitch[k] += theta
+        recording.depth[k] += zeta
+        for _ in range(10):
+            w, q, theta, zeta = (
+                w + 0.01 * (a1 * w + waves[0, k]),
+                q + 0.01 * (a2 * q + a3 * theta + waves[1, k]),
+                theta + 0.01 * q,
+                zeta + 0.01 * (w - u0 * theta),
+            )
+    fit = fit_maximum_likelihood([recording])
+    assert fit.has_process_noise
+    assert fit.waves[0] == pytest.approx(frequency, rel=0.1)
+    assert fit.waves[1] == pytest.approx(0.1, abs=0.07)
+    std = np.sqrt(np.diag(covariance(fit)))
+    assert (np.abs(fit.parameters - TRUTH) < 4.0 * std).all()

@@ -4,7 +4,7 @@ Dives of the linear vehicle under everything that real ones bring: a steering au
 coarse or coloured sensors, missing samples, short dives.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 
@@ -134,32 +134,32 @@ def _identified(job: tuple[str, int]) -> tuple[Array, Array, Array]:
 
 def measure(
     names: list[str], seeds: int, workers: int, on_progress: Callable[[str], None]
-) -> dict[str, Score]:
+) -> Iterator[tuple[str, Score]]:
     """Each campaign flown `seeds` times."""
-    scores = {}
     with get_context("spawn").Pool(workers) as pool:
         for name in names:
             on_progress(name)
             answers = pool.map(_identified, [(name, FIRST_SEED + seed) for seed in range(seeds)], chunksize=1)
             values, stds, bounds = (np.array(column) for column in zip(*answers, strict=True))
             with np.errstate(all="ignore"):
-                scores[name] = score(values, stds, bounds, np.array(CAMPAIGNS[name].case.vehicle))
-    return scores
+                yield name, score(values, stds, bounds, np.array(CAMPAIGNS[name].case.vehicle))
 
 
-def show(scores: dict[str, Score]) -> str:
-    """The table as text."""
-    text = [f"{'':36s}" + "".join(f"{name:>9s}" for name in NAMES) + f"{'all':>9s}"]
-    for name, s in scores.items():
-        text.append(f"{name} | {s.dives} times" + f", diverged {s.diverged}" * (s.diverged > 0))
-        for label, row, digits in (
-            ("bias %", s.bias, 2),
-            ("deviation / Cramér-Rao bound", s.efficiency, 2),
-            ("stated / actual deviation", s.honesty, 2),
-            ("95 % intervals that hold, %", s.coverage, 1),
-        ):
-            cells = [*row, np.nanmean(row)] if label.startswith("95") else [*row, np.nan]
-            text.append(f"    {label:32s}" + "".join(_number(value, digits) for value in cells))
+def show(name: str, scored: Score) -> str:
+    """One campaign as text; the last column is the mean over the parameters."""
+    diverged = f", diverged {scored.diverged}" if scored.diverged and CAMPAIGNS[name].has_bound else ""
+    text = [
+        f"{name} | {scored.dives} times{diverged}",
+        f"{'':36s}" + "".join(f"{parameter:>9s}" for parameter in NAMES) + f"{'all':>9s}",
+    ]
+    for label, row, digits in (
+        ("bias %", scored.bias, 2),
+        ("deviation / Cramér-Rao bound", scored.efficiency, 2),
+        ("stated / actual deviation", scored.honesty, 2),
+        ("95 % intervals that hold, %", scored.coverage, 1),
+    ):
+        overall = np.nanmean(row) if label.startswith("95") else np.nan
+        text.append(f"    {label:32s}" + "".join(_number(value, digits) for value in [*row, overall]))
     return "\n".join(text)
 
 
