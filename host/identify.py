@@ -86,7 +86,7 @@ def _learn(
         std[std > UNKNOWN] = np.inf
         values = dict(zip(NAMES, fit.parameters.tolist(), strict=True))
         deviations = dict(zip(NAMES, std.tolist(), strict=True))
-        model = model_of(recordings, vehicle.name, method, values, deviations, fit.noise)
+        model = model_of(recordings, vehicle.name, method, values, deviations, fit.noise, wander=fit.wander)
         return model, fit, None
     on_progress("sample by sample" if method == "robust" else "regression on CAR rows")
     if method == "car":
@@ -155,6 +155,12 @@ def _notes(fit: Fit | None, method: Method) -> list[str]:
         notes.append(
             "The innovations are still coloured, so something systematic is left over; the deviations are "
             "corrected for it."
+        )
+    if fit.waves.any():
+        frequency, damping = fit.waves
+        notes.append(
+            f"The random forces swing like waves: met at {frequency:.2g} rad/s (every "
+            f"{2.0 * np.pi / frequency:.2g} s), damping ratio {damping:.2g}."
         )
     if fit.has_coloured_noise:
         notes.append(f"The sensors' errors wander{_wandering(fit)}; the deviations include it.")

@@ -23,7 +23,8 @@ class VehicleModel:
 
     values, std  by parameter name (host.equations), SI units; std 0 where a value was given, not estimated
     noise        standard deviations "pitch_rad", "depth_m" and, where unknown forces were found, densities
-                 "heave_force_density", "pitch_moment_density"
+                 "heave_force_density", "pitch_moment_density"; where a sensor's error wanders, deviation and
+                 correlation time of that part, "depth_wander_m", "depth_wander_s"
     valid_range  smallest and largest "pitch_rad", "rudder_rad", "depth_m", "speed_mps" the data held
     provenance   recording names with sha256, program version, method
     """
@@ -64,13 +65,17 @@ def model_of(
     std: dict[str, float],
     noise: Array | None = None,
     effects: list[dict[str, Any]] | None = None,
+    wander: Array | None = None,
 ) -> VehicleModel:
-    """A model learnt from these recordings; `noise` as in host.fit.Fit."""
+    """A model learnt from these recordings; `noise` and `wander` as in host.fit.Fit."""
     named: dict[str, float] = {}
     if noise is not None:
         named = {"pitch_rad": float(np.sqrt(noise[0])), "depth_m": float(np.sqrt(noise[1]))}
         if noise[2:].any():
             named |= {"heave_force_density": float(noise[2]), "pitch_moment_density": float(noise[3])}
+    if wander is not None and wander.any():
+        for (sensor, unit), (variance, time) in zip((("pitch", "rad"), ("depth", "m")), wander, strict=True):
+            named |= {f"{sensor}_wander_{unit}": float(np.sqrt(variance)), f"{sensor}_wander_s": float(time)}
     valid_range = {}
     channels = dict(pitch_rad="pitch", rudder_rad="rudder", depth_m="depth", speed_mps="speed")
     for key, name in channels.items():

@@ -9,9 +9,11 @@ from host.ascent import place
 from host.coloured_noise import WanderingSensors, coloured_noise
 from host.filter_error import RandomForces, filter_error
 from host.gauss_newton import Point
+from host.identify import identify
 from host.maximum_likelihood import fit_maximum_likelihood
 from host.propagate import free_run, inputs_of
 from host.uncertainty import covariance
+from host.vehicle import default_vehicle
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 
@@ -115,3 +117,10 @@ def test_waves_are_found_with_their_frequency_and_bias_nothing() -> None:
     assert fit.waves[1] == pytest.approx(0.1, abs=0.07)
     std = np.sqrt(np.diag(covariance(fit)))
     assert (np.abs(fit.parameters - TRUTH) < 4.0 * std).all()
+
+
+def test_wandering_is_told_and_kept_in_the_model() -> None:
+    result = identify([with_wandering_depth()], default_vehicle())
+    assert any(note.startswith("The sensors' errors wander") and "depth" in note for note in result.notes)
+    assert result.model.noise["depth_wander_m"] == pytest.approx(0.03, rel=0.3)
+    assert result.model.noise["depth_wander_s"] == pytest.approx(2.0, rel=0.5)
