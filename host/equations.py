@@ -94,6 +94,7 @@ class Effect:
     sense     changes what the sensors give
     state     name of the state the effect brings with it, and `initial`, its value at the first row
     probes    start values of its parameters to try; `scales` fits them to a recording
+    periods   limits, s, of the last parameter where it is a period, to be read off the residuals
     lags      whether it looks at earlier commands
     is_common whether every vehicle has it: always tried, and preferred where the recording cannot decide
     """
@@ -106,6 +107,7 @@ class Effect:
     manoeuvre: str
     probes: tuple[tuple[float, ...], ...]
     scales: tuple[str, ...] = ()
+    periods: tuple[float, float] | None = None
     force: Term | None = None
     command: Term | None = None
     actuator: Callable[[Chain, ca.SX, ca.SX], tuple[ca.SX, ca.SX]] | None = None

@@ -7,7 +7,7 @@ import numpy as np
 
 from host.ascent import ascend
 from host.fit import Fit, finished
-from host.gauss_newton import Point, whiten
+from host.gauss_newton import Mask, Point, whiten
 from host.kalman import KalmanPass, kalman_pass
 from host.propagate import Inputs, innovations
 from host.recording import Array
@@ -40,12 +40,17 @@ class RandomForces:
 
 def filter_error(start: Fit, inputs: list[Inputs], most_steps: int = 40) -> Fit:
     """Climbs from a fit without forces to the likeliest parameters and noise levels with them."""
-    model = RandomForces(inputs)
     noise = start.noise if start.has_process_noise else _first_noise(start, inputs)
     point = Point(start.structure, start.parameters, start.initial, noise)
-    end, used, converged = ascend(point, model, start.free, most_steps)
+    return filter_error_from(point, inputs, start.free, most_steps)
+
+
+def filter_error_from(point: Point, inputs: list[Inputs], free: Mask, most_steps: int = 40) -> Fit:
+    """The same from any point with forces."""
+    model = RandomForces(inputs)
+    end, used, converged = ascend(point, model, free, most_steps)
     white = model.whitened(end.point, end.passes)
-    return finished(end.point, white, inputs, start.free, end.likelihood, used, converged)
+    return finished(end.point, white, inputs, free, end.likelihood, used, converged)
 
 
 def whitened_innovations(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:

@@ -3,7 +3,9 @@
 The names are a contract: reports, tests and users rely on them.
 """
 
-from host.catalogue import actuator, environment, heave, kinematics, pitch, sensor, surge
+import copyreg
+
+from host.catalogue import actuator, environment, heave, kinematics, nuisance, pitch, sensor, surge
 from host.equations import Effect, Structure
 
 CATALOGUE: tuple[Effect, ...] = (
@@ -16,11 +18,23 @@ CATALOGUE: tuple[Effect, ...] = (
     *environment.EFFECTS,
 )
 BY_NAME = {effect.name: effect for effect in CATALOGUE}
+_ALL = BY_NAME | {effect.name: effect for effect in (nuisance.FREE_TRIM, nuisance.ANY_SMOOTH_FORCE)}
+OFFSETS = ("net_buoyancy", "trim_moment", "rudder_offset", "pitch_bias", "vertical_current")
+"""Effects that do no more than shift the steady state, as nuisance.FREE_TRIM does without saying why."""
+
+
+def named(name: str) -> Effect:
+    """The entry, or the nuisance, of that name."""
+    return _ALL[name]
+
+
+# Between processes an effect travels by its name: its equations are code.
+copyreg.pickle(Effect, lambda effect: (named, (effect.name,)))
 
 
 def structure_of(names: frozenset[str] | tuple[str, ...]) -> Structure:
     """The base equations with the named effects. Raises KeyError for a name that is not in the catalogue."""
-    unknown = [name for name in names if name not in BY_NAME]
+    unknown = [name for name in names if name not in _ALL]
     if unknown:
         raise KeyError(unknown[0])
-    return Structure(tuple(effect for effect in CATALOGUE if effect.name in names))
+    return Structure(tuple(effect for effect in _ALL.values() if effect.name in names))

@@ -49,8 +49,8 @@ EFFECTS = (
         sentence="The water heaves slowly up and down (an internal wave).",
         equation="zeta' = ... + internal_sine sin(2 pi t/T) + internal_cosine cos(2 pi t/T)",
         manoeuvre="a straight level run of several periods with the planes fixed",
-        probes=tuple((1e-3, 1e-3, share) for share in (0.08, 0.13, 0.2, 0.32, 0.5, 0.9)),
-        scales=("", "", "duration"),
+        probes=((1e-3, 1e-3, 100.0),),
+        periods=(15.0, 20000.0),
         force=_internal_wave,
     ),
     Effect(
@@ -68,7 +68,8 @@ EFFECTS = (
         sentence="Surface waves carry the vehicle up and down, less so the deeper it is.",
         equation="zeta' = ... + exp(-k zeta) (wave_sine sin ot + wave_cosine cos ot), o = 2 pi/T, k = o^2/g",
         manoeuvre="level runs at two depths, the shallower one within a few metres of the surface",
-        probes=tuple((0.01, 0.01, period) for period in (3.5, 5.0, 6.5, 8.5, 11.0, 15.0)),
+        probes=((0.01, 0.01, 7.0),),
+        periods=(2.0, 20.0),
         force=_surface_waves,
     ),
 )

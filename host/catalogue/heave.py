@@ -38,7 +38,7 @@ EFFECTS = (
         equation="w' = ... + c_wq (u/u0) q",
         manoeuvre="quick plane reversals (3-2-1-1) at cruising speed, which make the pitch rate large",
         probes=((0.5,), (-0.5,)),
-        scales=("speed",),
+        scales=("",),
         force=_coupling,
         is_common=True,
     ),

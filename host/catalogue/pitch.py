@@ -14,7 +14,7 @@ def _trim(c: Chain) -> None:
 
 
 def _munk(c: Chain) -> None:
-    c.pitch += c.p["c_qw"] * c.w
+    c.pitch += c.p["c_qw"] * c.speed_ratio * c.w
 
 
 def _restoring(c: Chain) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 
 from host.catalogue import BY_NAME
 from host.diagnosis.diagnose import Diagnosis
+from host.diagnosis.fitter import Explanation
 from host.diagnosis.scoring import Misfit
-from host.diagnosis.search import Explanation
 from host.equations import NAMES
 from host.model import model_of, write_model
 from host.vehicle import Vehicle

@@ -48,10 +48,17 @@ def _regressed(target: Array, columns: Columns) -> dict[str, float]:
 
 
 def _smoothed(recording: Recording, speed: float) -> Columns:
-    """The smoothed motion without its ends, where smoothing lacks one side."""
+    """The smoothed motion without the ends and long gaps, where smoothing lacks one side."""
     motion = smoothed_motion(recording, speed)
     margin = int(4 * max(1.0, SMOOTHING / recording.step))
-    inside = slice(margin, max(margin + 1, recording.time.size - margin))
+    rows = np.arange(recording.time.size)
+    inside = (rows >= margin) & (rows < rows.size - margin)
+    for values in (recording.pitch, recording.depth):
+        known = np.flatnonzero(np.isfinite(values))
+        after = np.searchsorted(known, rows).clip(1, known.size - 1)
+        inside &= known[after] - known[after - 1] <= margin
+    if not inside.any():
+        inside[:] = True
     return {name: values[inside] for name, values in motion.items()}
 
 

@@ -1,6 +1,7 @@
 """The sensors' own noise, from the recording alone: below it there is nothing left to explain."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from host.recording import Array, Recording
 
@@ -14,6 +15,12 @@ def noise_floor(recordings: list[Recording]) -> Array:
     not to move a median. A quantised channel at rest gives zero: its rounding is the least.
     """
     return np.array([_channel([r.pitch for r in recordings]), _channel([r.depth for r in recordings])])
+
+
+def is_quantised(recordings: list[Recording]) -> NDArray[np.bool_]:
+    """Whether rounding rules the noise of pitch, of depth."""
+    channels = [r.pitch for r in recordings], [r.depth for r in recordings]
+    return np.array([_quantum(pieces) ** 2 / 12.0 > 0.5 * _channel(pieces) for pieces in channels])
 
 
 def _channel(pieces: list[Array]) -> float:

@@ -1,26 +1,34 @@
 """Which parts of the recordings teach, and which only judge."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from host.recording import Recording
 
-BLOCKS = 6  # the second and the fifth judge: a change at a moment has teaching data on both sides
-SHORTEST_BLOCK = 8.0  # s; a free run over less says little
+SHORTEST_DIVIDED = 48.0  # s; a shorter recording judges as a whole or not at all
+SHORTEST_SPAN = 8.0  # s; a free run over less says little
+JUDGING_SHARE = 0.1  # of a recording, in each of two spans
+LONGEST_RUN = 600.0  # s; a teaching run starts anew after so long, or the smallest drift would rule it
+LEAST_MEASURED = 20  # values of each channel, for a span to be of use
 
 
 @dataclass(frozen=True, slots=True)
 class Spans:
-    """Stretches to learn from, and stretches that are used for nothing but the final score."""
+    """Recordings to learn from, and stretches that are used for nothing but the final score.
+
+    In the teaching recordings the judging spans are blank: the plane is known there, the measurements are
+    not. So a free run passes through them, and what it learns before and after belongs to one motion.
+    """
 
     teaching: list[Recording]
     judging: list[Recording]
 
 
 def divide(recordings: list[Recording]) -> Spans:
-    """Two blocks of six of each recording judge; of many short recordings, every third one as a whole."""
-    if all(recording.duration < BLOCKS * SHORTEST_BLOCK for recording in recordings):
+    """Two spans of each recording judge; of many short recordings, every third one as a whole."""
+    if all(recording.duration < SHORTEST_DIVIDED for recording in recordings):
         if len(recordings) < 3:
             return Spans(recordings, [])
         return Spans(
@@ -30,13 +38,35 @@ def divide(recordings: list[Recording]) -> Spans:
     teaching: list[Recording] = []
     judging: list[Recording] = []
     for recording in recordings:
-        if recording.duration < BLOCKS * SHORTEST_BLOCK:
-            teaching.append(recording)
-            continue
-        edges = np.linspace(recording.time[0], recording.time[-1] + recording.step, BLOCKS + 1)
-        runs = ((0, 1, teaching), (1, 2, judging), (2, 4, teaching), (4, 5, judging), (5, 6, teaching))
-        for first, last, side in runs:
-            piece = recording.between(float(edges[first]), float(edges[last]))
-            if np.isfinite(piece.depth).sum() >= 20 and np.isfinite(piece.pitch).sum() >= 20:
-                side.append(piece)
+        kept = recording
+        if recording.duration >= SHORTEST_DIVIDED:
+            length = max(SHORTEST_SPAN, JUDGING_SHARE * recording.duration)
+            for centre in (0.3, 0.75):  # teaching data on both sides, wherever something changed
+                start = recording.time[0] + centre * recording.duration - 0.5 * length
+                piece = recording.between(start, start + length)
+                if _is_measured(piece):
+                    judging.append(piece)
+                    kept = _blanked(kept, start, start + length)
+        teaching += [run for run in _runs(kept) if _is_measured(run)]
     return Spans(teaching, judging)
+
+
+def _is_measured(recording: Recording) -> bool:
+    measured = min(np.isfinite(recording.depth).sum(), np.isfinite(recording.pitch).sum())
+    return bool(measured >= LEAST_MEASURED)
+
+
+def _blanked(recording: Recording, start: float, end: float) -> Recording:
+    inside = (recording.time >= start) & (recording.time < end)
+    return replace(
+        recording,
+        depth=np.where(inside, np.nan, recording.depth),
+        pitch=np.where(inside, np.nan, recording.pitch),
+        pitch_rate=np.where(inside, np.nan, recording.pitch_rate),
+    )
+
+
+def _runs(recording: Recording) -> list[Recording]:
+    count = max(1, round(recording.duration / LONGEST_RUN))
+    edges = np.linspace(recording.time[0], recording.time[-1] + recording.step, count + 1)
+    return [recording.between(float(start), float(end)) for start, end in pairwise(edges)]

@@ -28,11 +28,20 @@ def test_noise_floor_of_a_channel_slower_than_the_grid() -> None:
 def test_judging_spans_teach_nothing() -> None:
     recording = hidden_dive()
     spans = divide([recording])
-    taught = {time for piece in spans.teaching for time in piece.time}
-    judged = {time for piece in spans.judging for time in piece.time}
-    assert not taught & judged
-    assert taught | judged == set(recording.time)
-    assert 0.25 < len(judged) / recording.time.size < 0.42
+    (teaching,) = spans.teaching
+    judged = np.isin(recording.time, np.concatenate([piece.time for piece in spans.judging]))
+    np.testing.assert_array_equal(teaching.time, recording.time)
+    assert np.isnan(teaching.depth[judged]).all()
+    assert np.isnan(teaching.pitch[judged]).all()
+    np.testing.assert_array_equal(teaching.pitch[~judged], recording.pitch[~judged])
+    assert 0.15 < judged.mean() < 0.35
+
+
+def test_of_many_short_dives_every_third_judges() -> None:
+    dives = [hidden_dive(seed=seed, duration=20.0) for seed in range(5)]
+    spans = divide(dives)
+    assert [dive is dives[i] for dive, i in zip(spans.judging, (1, 4), strict=True)] == [True, True]
+    assert len(spans.teaching) == 3
 
 
 def test_nothing_hidden_is_no_mismatch() -> None:

@@ -1,0 +1,281 @@
+"""Fits of sets of effects, jointly with the base, to the recordings of one vehicle."""
+
+from dataclasses import dataclass
+from math import log
+
+import numpy as np
+from scipy.signal import lombscargle
+
+from host.catalogue import named, structure_of
+from host.catalogue.nuisance import FREE_TRIM
+from host.diagnosis.first_guess import accelerations, first_guess
+from host.diagnosis.noise_floor import noise_floor
+from host.equations import NAMES, Effect
+from host.filter_error import filter_error, filter_error_from, whitened_innovations
+from host.fit import Fit
+from host.gauss_newton import GaussNewton, Mask, Point
+from host.maximum_likelihood import RUNAWAY, annealed, fit_maximum_likelihood, output_error, residuals_at
+from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
+from host.recording import Array, Recording
+
+Names = frozenset[str]
+HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
+RARITY = 4.0  # of BIC, odds of 7 to 1 against what not every vehicle has: decides between exact twins
+FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
+# Enough to rank sets; those that count are polished.
+FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 3, 12, 0.5
+PERIODS_TRIED = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """A set of effects, fitted jointly with the base."""
+
+    names: Names
+    fit: Fit
+    bic: float
+
+
+class Fitter:
+    """All that the fits of one diagnosis share: recordings, noise floor, what is held, where fits start.
+
+    known  an explanation of other stretches of the same vehicle; without one the base model is fitted
+    """
+
+    def __init__(self, recordings: list[Recording], known: Explanation | None = None) -> None:
+        self.recordings = recordings
+        self.floor = noise_floor(recordings)
+        self.accelerations = accelerations(recordings)
+        self.held = dict(HELD)
+        if recordings[0].has_speed:
+            self.held["u0"] = float(np.mean([r.speed.mean() for r in recordings]))
+            # Where the speed is measured its loss is data, and there is nothing in it to estimate.
+            self.held |= {name: 0.0 for name in ("c_ud", "c_uq")} | {"speed_time": 1.0}
+        self._longest_substep = LONGEST_SUBSTEP
+        self._inputs: dict[Names, list[Inputs]] = {}
+        self.base = self._base() if known is None else known
+        parameters = self.base.fit.parameters
+        self._longest_substep = longest_substep(parameters)
+        self._speed = float(parameters[NAMES.index("u0")])
+        self._scales = {
+            "": 1.0,
+            "rudder": float(max(np.abs(r.rudder).max() for r in recordings)) or 1.0,
+            "duration": float(recordings[-1].time[-1]),
+            "depth": float(np.nanmean(np.concatenate([r.depth for r in recordings]))),
+        }
+
+    def _base(self) -> Explanation:
+        held = {name: value for name, value in self.held.items() if name in NAMES}
+        fit = fit_maximum_likelihood(self.recordings, held=held, noise_model="output_error")
+        return self._explained(frozenset(), fit)
+
+    def trimmed(self) -> Explanation:
+        """The base with a free constant force and moment, from which the search for all else sets out."""
+        held = {name: value for name, value in self.held.items() if name in NAMES and name not in HELD}
+        fit = fit_maximum_likelihood(self.recordings, held=held, noise_model="output_error")
+        names = frozenset({FREE_TRIM.name})
+        values = fit.parameters.copy()
+        trim = [NAMES.index(name) for name in HELD]
+        offsets, values[trim] = values[trim], 0.0
+        start = Point(structure_of(names), np.concatenate([values, offsets]), fit.initial, fit.noise)
+        return self._explained(names, output_error(start, self.inputs(names), self.free(names)))
+
+    def retrimmed(self, explanation: Explanation, offsets: Names) -> Explanation:
+        """The same set with some of the catalogue's offsets in place of the free trim."""
+        names = (explanation.names - {FREE_TRIM.name}) | offsets
+        fit = explanation.fit
+        known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
+        a1, a3, u0, b1, b2 = (known[name] for name in ("a1", "a3", "u0", "b1", "b2"))
+        shift = np.array([known["trim_heave"], known["trim_pitch"]])
+        # What one unit of each offset is in constant force and moment; a climb is held by force / -a1.
+        columns = {
+            "net_buoyancy": (1.0, 0.0),
+            "trim_moment": (0.0, 1.0),
+            "rudder_offset": (b1, b2),
+            "pitch_bias": (-a1 * u0, -a3),
+            "vertical_current": (-a1, 0.0),
+        }
+        chosen = sorted(offsets)
+        table = np.array([columns[name] for name in chosen]).reshape(-1, 2).T
+        values = np.linalg.lstsq(table, shift, rcond=1e-8)[0] if chosen else np.zeros(0)
+        known |= {named(n).parameters[0].name: float(v) for n, v in zip(chosen, values, strict=True)}
+        structure = structure_of(names)
+        parameters = np.array([known[name] for name in structure.names])
+        start = Point(structure, parameters, fit.initial, fit.noise)
+        return self._explained(names, self._carried_on(start))
+
+    def with_sea(self, explanation: Explanation) -> Explanation:
+        """The same set when random forces act as well; whatever grows from it is fitted with them, too."""
+        fit = filter_error(explanation.fit, self.inputs(explanation.names))
+        return self._explained(explanation.names, fit)
+
+    def excess(self, fit: Fit) -> float:
+        """Sensor noise of a fit over the noise floor, in the worse channel: 1 where nothing is left."""
+        return float(np.max(fit.noise[:2] / self.floor))
+
+    def grown(
+        self, parent: Explanation, name: str, values: list[Array], least_gain: float
+    ) -> Explanation | None:
+        """The parent's set with one effect more, from the most promising of its start values.
+
+        values      start values of the effect's parameters from elsewhere, beside its own probes
+        least_gain  None is returned where the predicted gain is below
+        """
+        probed = sorted(self._probed(parent, named(name), values), key=lambda pair: -pair[0])
+        if probed[0][0] < least_gain:
+            return None
+        names = parent.names | {name}
+        starts = [self._point(names, parent, name, probe) for _, probe in probed[:2]]
+        if self.excess(parent.fit) > FAR:
+            starts = [starts[0], self._guess(starts[0], names)]
+        return self._explained(names, self._fit(starts))
+
+    def gain(self, parent: Explanation, name: str, values: list[Array]) -> float:
+        """Twice the log-likelihood an effect could gain on top of the parent: one Gauss-Newton step ahead."""
+        return max(gain for gain, _ in self._probed(parent, named(name), values))
+
+    def shrunk(self, parent: Explanation, name: str) -> Explanation:
+        """The parent's set without one of its effects."""
+        names = parent.names - {name}
+        start = self._point(names, parent)
+        starts = [start]
+        if self.excess(parent.fit) > FAR:
+            starts.append(self._guess(start, names))
+        return self.polished(self._explained(names, self._fit(starts)))
+
+    def polished(self, explanation: Explanation) -> Explanation:
+        """The same set, its fit carried on until nothing more is gained."""
+        fit = explanation.fit
+        start = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+        return self._explained(explanation.names, self._carried_on(start))
+
+    def refitted(self, explanation: Explanation) -> Explanation:
+        """A set fitted to other stretches, fitted to these."""
+        structure, values = structure_of(explanation.names), explanation.fit.parameters.copy()
+        for name, value in self.held.items():
+            if name in structure.names:
+                values[structure.names.index(name)] = value
+        initial = [
+            np.array([0.0, 0.0, _first(recording.pitch), _first(recording.depth)])
+            for recording in self.recordings
+        ]
+        start = Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0]))
+        free, inputs = self.free(explanation.names), self.inputs(explanation.names)
+        starts = [start, annealed(start, inputs, free, self.accelerations)]
+        return self.polished(self._explained(explanation.names, self._fit(starts)))
+
+    def free(self, names: Names) -> Mask:
+        """Which parameters of a set are estimated."""
+        return np.array([name not in self.held for name in structure_of(names).names])
+
+    def free_parameters(self, names: Names) -> int:
+        """How many coefficients the set adds to the base."""
+        return int(self.free(names).sum() - self.free(frozenset()).sum())
+
+    def bic(self, fit: Fit, names: Names) -> float:
+        """Bayesian information criterion of a fit; lower is better."""
+        rare = sum(not named(name).is_common for name in names)
+        return fit.bic + self.free_parameters(names) * log(fit.samples) + RARITY * rare
+
+    def inputs(self, names: Names) -> list[Inputs]:
+        """What drives the set's equations over each recording."""
+        if names not in self._inputs:
+            structure = structure_of(names)
+            self._inputs[names] = [
+                inputs_of(recording, structure, self._longest_substep) for recording in self.recordings
+            ]
+        return self._inputs[names]
+
+    def _explained(self, names: Names, fit: Fit) -> Explanation:
+        return Explanation(names, fit, self.bic(fit, names))
+
+    def _probed(self, parent: Explanation, effect: Effect, values: list[Array]) -> list[tuple[float, Array]]:
+        """Predicted gain and start values of an effect, for each of its probes."""
+        names = parent.names | {effect.name}
+        inputs, free = self.inputs(names), self.free(names)
+        before = sum(float(np.nansum(e**2)) for e in parent.fit.whitened)
+        has_sea = parent.fit.has_process_noise
+        own = self._probes(effect, parent)
+        probed = []
+        for probe in [*values, *own[:1]] if values else own:
+            point = self._point(names, parent, effect.name, probe)
+            with np.errstate(over="ignore", invalid="ignore"):
+                white = (whitened_innovations if has_sea else residuals_at)(point, inputs)
+                runs_away = not all(np.abs(S).max() < RUNAWAY for _, S in white)
+                cost = sum(float(np.sum(e**2)) for e, _ in white)
+            left = np.inf if runs_away else GaussNewton(white, point, free).predicted_cost(cost)
+            probed.append((before - left, probe))
+        return probed
+
+    def _probes(self, effect: Effect, parent: Explanation) -> list[Array]:
+        scales = np.array([self._scales[scale] for scale in effect.scales or ("",) * len(effect.parameters)])
+        probes = [np.array(probe) * scales for probe in effect.probes]
+        if effect.periods is not None:
+            # The start values' last entry is a period, and it must be nearly right.
+            probes = [
+                np.array([*probes[0][:-1], period]) for period in self._periods(effect.periods, parent.fit)
+            ]
+        return probes
+
+    def _periods(self, limits: tuple[float, float], fit: Fit) -> list[float]:
+        """The strongest periods in the depth residuals of the longest recording, s."""
+        longest = max(range(len(self.recordings)), key=lambda k: self.recordings[k].duration)
+        time, residual = self.recordings[longest].time, fit.whitened[longest][1]
+        known = np.isfinite(residual)
+        span = float(np.ptp(time[known]))
+        slowest = min(limits[1], 1.5 * span)
+        if slowest <= limits[0]:
+            return [slowest]
+        # Depth is the integral of the water's motion: a fine grid, as phases drift over the whole span.
+        frequencies = np.arange(1.0 / slowest, 1.0 / limits[0], 0.25 / span)
+        power = lombscargle(time[known], residual[known], 2.0 * np.pi * frequencies, precenter=True)
+        periods: list[float] = []
+        for k in np.argsort(-power * frequencies**2):
+            if all(abs(frequencies[k] - 1.0 / other) > 1.0 / span for other in periods):
+                periods.append(float(1.0 / frequencies[k]))
+            if len(periods) == PERIODS_TRIED:
+                break
+        return periods
+
+    def _guess(self, start: Point, names: Names) -> Point:
+        """The rough values of regression where it gives some, `start` elsewhere, moved into their valley."""
+        rough = first_guess(self.recordings, self._speed, names)
+        rough = {name: value for name, value in rough.items() if name not in self.held}
+        own = zip(start.structure.names, start.parameters, strict=True)
+        values = np.array([rough.get(name, value) for name, value in own])
+        point = Point(start.structure, values, start.initial, np.array([*self.floor, 0.0, 0.0]))
+        return annealed(point, self.inputs(names), self.free(names), self.accelerations)
+
+    def _point(
+        self, names: Names, parent: Explanation, added: str | None = None, probe: Array | None = None
+    ) -> Point:
+        fit = parent.fit
+        known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
+        if added is not None and probe is not None:
+            known |= {p.name: v for p, v in zip(named(added).parameters, probe.tolist(), strict=True)}
+        known |= {name: value for name, value in self.held.items() if name in known}
+        structure = structure_of(names)
+        return Point(structure, np.array([known[name] for name in structure.names]), fit.initial, fit.noise)
+
+    def _fit(self, starts: list[Point]) -> Fit:
+        """Goes a few steps from every start and on from the best."""
+        structure = starts[0].structure
+        names = frozenset(effect.name for effect in structure.effects)
+        inputs, free = self.inputs(names), self.free(names)
+        if starts[0].noise[2:].any():
+            return max(map(self._carried_on, starts[:1]), key=lambda fit: fit.log_likelihood)
+        fits = [output_error(start, inputs, free, FIRST_ITERATIONS, TOLERANCE) for start in starts]
+        best = max(fits, key=lambda fit: fit.log_likelihood)
+        on = Point(structure, best.parameters, best.initial, best.noise)
+        return best if best.converged else output_error(on, inputs, free, MOST_ITERATIONS, TOLERANCE)
+
+    def _carried_on(self, start: Point) -> Fit:
+        names = frozenset(effect.name for effect in start.structure.effects)
+        inputs, free = self.inputs(names), self.free(names)
+        if start.noise[2:].any():
+            return filter_error_from(start, inputs, free)
+        return output_error(start, inputs, free)
+
+
+def _first(values: Array) -> float:
+    return float(values[np.isfinite(values)][0])

@@ -1,0 +1,58 @@
+"""Fits side by side on several cores: each worker keeps the recordings and its own functions."""
+
+import multiprocessing
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
+from types import TracebackType
+from typing import Any
+
+from host.diagnosis.fitter import Fitter
+
+Task = tuple[str, tuple[Any, ...]]
+"""A method of Fitter and its arguments."""
+
+_fitter: Fitter
+
+
+class Workers:
+    """Calls methods of a Fitter in order; one job calls them here, more in processes of their own."""
+
+    def __init__(self, fitter: Fitter, jobs: int) -> None:
+        self._fitter = fitter
+        self._pool: ProcessPoolExecutor | None = None
+        if jobs > 1:
+            # Spawned, not forked: the progress display runs a thread, and forks do not survive threads.
+            context = multiprocessing.get_context("spawn")
+            self._pool = ProcessPoolExecutor(jobs, context, _open, (fitter.recordings, fitter.base))
+
+    def __enter__(self) -> "Workers":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(cancel_futures=True)
+
+    def results(self, tasks: Iterable[Task], on_done: Callable[[int], None] = lambda _: None) -> list[Any]:
+        """What each task returns, in order; `on_done` gets the number of each as it ends."""
+        found = []
+        if self._pool is None:
+            for number, (method, arguments) in enumerate(tasks):
+                found.append(getattr(self._fitter, method)(*arguments))
+                on_done(number)
+            return found
+        waiting = [self._pool.submit(_call, method, arguments) for method, arguments in tasks]
+        for number, future in enumerate(waiting):
+            found.append(future.result())
+            on_done(number)
+        return found
+
+
+def _open(*arguments: Any) -> None:
+    global _fitter
+    _fitter = Fitter(*arguments)
+
+
+def _call(method: str, arguments: tuple[Any, ...]) -> Any:
+    return getattr(_fitter, method)(*arguments)
