@@ -27,8 +27,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not names:
         parser.error(f"--only must be part of a campaign's name (got {args.only!r})")
     with progress(args.quiet) as say:
-        for name, scored in measure(names, args.seeds, args.workers, say):
-            print(show(name, scored), flush=True)
+        for line in measure(names, args.seeds, args.workers, say):
+            print(show(*line), flush=True)
     return 0
 
 

@@ -38,7 +38,7 @@ def test_the_joint_bound_is_that_of_one_dive_and_falls_with_more():
 def test_the_table_is_printed(capsys):
     assert main(["--seeds", "2", "--only", "8 dives", "--workers", "1", "--quiet"]) == 0
     said = capsys.readouterr().out
-    assert "8 dives of 20 s | 2 times" in said
+    assert "8 dives of 20 s | 2 times, " in said
     assert "95 % intervals that hold" in said
 
 

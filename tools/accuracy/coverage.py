@@ -7,6 +7,7 @@ coarse or coloured sensors, missing samples, short dives.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
+from time import process_time
 
 import numpy as np
 from scipy.signal import lfilter
@@ -119,37 +120,40 @@ def _wander(rng: np.random.Generator, deviation: float, time: float, step: float
     return np.asarray(lfilter([1.0], [1.0, -kept], kicks))
 
 
-def _identified(job: tuple[str, int]) -> tuple[Array, Array, Array]:
+def _identified(job: tuple[str, int]) -> tuple[Array, Array, Array, float]:
     name, seed = job
     campaign = CAMPAIGNS[name]
     dives = dives_of(campaign, seed)
+    begun = process_time()
     with np.errstate(all="ignore"):
         fit = fit_maximum_likelihood([recording_of(dive) for dive in dives])
         values, std = fit.parameters[:6].copy(), np.sqrt(np.diag(covariance(fit)))[:6]
+    seconds = process_time() - begun
     if campaign.case.tells_speed:
         values[5] = std[5] = np.nan
     bound = joint_bound(dives, campaign.coloured) if campaign.has_bound else np.full(6, np.nan)
-    return values, std, bound
+    return values, std, bound, seconds
 
 
 def measure(
     names: list[str], seeds: int, workers: int, on_progress: Callable[[str], None]
-) -> Iterator[tuple[str, Score]]:
-    """Each campaign flown `seeds` times."""
+) -> Iterator[tuple[str, Score, float]]:
+    """Each campaign flown `seeds` times, with the median seconds of one core that a fit took."""
     with get_context("spawn").Pool(workers) as pool:
         for name in names:
             on_progress(name)
             answers = pool.map(_identified, [(name, FIRST_SEED + seed) for seed in range(seeds)], chunksize=1)
-            values, stds, bounds = (np.array(column) for column in zip(*answers, strict=True))
+            values, stds, bounds, seconds = (np.array(column) for column in zip(*answers, strict=True))
             with np.errstate(all="ignore"):
-                yield name, score(values, stds, bounds, np.array(CAMPAIGNS[name].case.vehicle))
+                scored = score(values, stds, bounds, np.array(CAMPAIGNS[name].case.vehicle))
+            yield name, scored, float(np.median(seconds))
 
 
-def show(name: str, scored: Score) -> str:
+def show(name: str, scored: Score, seconds: float) -> str:
     """One campaign as text; the last column is the mean over the parameters."""
     diverged = f", diverged {scored.diverged}" if scored.diverged and CAMPAIGNS[name].has_bound else ""
     text = [
-        f"{name} | {scored.dives} times{diverged}",
+        f"{name} | {scored.dives} times, {seconds:.1f} s each{diverged}",
         f"{'':36s}" + "".join(f"{parameter:>9s}" for parameter in NAMES) + f"{'all':>9s}",
     ]
     for label, row, digits in (
