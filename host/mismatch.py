@@ -46,7 +46,8 @@ SUSPICIOUS = 0.5  # of the threshold: from here on the reference is kept as it i
 NO_WORSE = 1.2  # ratio of prediction errors up to which a new snapshot is as good as the reference
 EXPLAINED = 0.2  # share of the excess error that a change must explain to be named
 AS_GOOD = 0.85  # of what the best change explains: one of another slot that explains more is as good
-PATIENCE = 10  # windows for which an alarm waits for its slot to become clear
+PATIENCE = 8  # windows for which an alarm waits: one that holds the moment of the change misleads
+NAMING = 4  # of them, the last ones, that name the slot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +61,7 @@ class MismatchConfig:
     horizon: float | None = None  # s, > 0: length of a free run; default 10 T (10 s)
     period: float | None = None  # s, > 0: between two free runs; default a tenth of the horizon
     persistence: int = 10  # free runs, 1 to 100, over which the deviation is averaged
-    threshold: float = 3.6  # > 0: mean deviation that is an alarm, in spreads of the same vehicle's past
+    threshold: float = 3.2  # > 0: mean deviation that is an alarm, in spreads of the same vehicle's past
     memory: float = 1800.0  # s, > 0: past that sets the level
     settling: float = 300.0  # s, >= 0: past without which nothing is judged, also after an alarm
     refresh: float = 60.0  # s, > 0: between two snapshots of the live estimate
@@ -136,7 +137,7 @@ class MismatchWatch:
         self._fixed = None if config.model is None else read_reference(config.model)
         self._window = PredictionWindow(max(10, round(horizon / step)), step)
         self._history = PredictionHistory(max(self._settling, round(config.memory / step / self._every)))
-        self._recent: deque[tuple[Comparison, Array]] = deque(maxlen=config.persistence + PATIENCE)
+        self._recent: deque[tuple[Comparison, Array]] = deque(maxlen=max(config.persistence, NAMING))
         self._samples = 0
         self._begin()
 
@@ -215,12 +216,11 @@ class MismatchWatch:
         if highest <= self._config.threshold and not self._waited:
             return None
         self._waited += 1
-        alarm = _explained([comparison for comparison, _ in self._recent], past, t_us)
-        if alarm.others and self._waited < PATIENCE:
+        if self._waited < PATIENCE:
             return None
+        self.current = _explained([comparison for comparison, _ in self._recent][-NAMING:], past, t_us)
         self._begin()
-        self.current = alarm
-        return alarm
+        return self.current
 
 
 def _explained(recent: list[Comparison], past: Past, t_us: int) -> Mismatch:

@@ -10,17 +10,17 @@ from host.prediction_window import NAMES, Array, Comparison
 SMALLEST = 60  # windows that judge; where fewer moved as much, the most active ones, stretched
 SIMILAR = 0.8  # of the present activity: the least that counts as moving as much
 HELD_BACK = 60  # windows that are not yet history: the beginning of a fault must not set its own level
-SPREAD_FLOOR = 0.1  # of a channel's level: the least spread of its error
 OVERLAP = 10.0  # windows that share their samples, and count as one
 CAUTION = 4.0  # over the number of separate windows: by so much more is the spread that few of them show
-EVIDENCE_FLOOR = 1.0  # least spread of an evidence: that of white noise
 
 DETECTING = ("heave_force", "pitch_moment", "plane_force")
 """The changes whose evidence alone may raise an alarm: the least heavy-tailed at sea."""
 
 _EVIDENCE = slice(2, 2 + len(NAMES))
 _LEVERAGE = slice(2 + len(NAMES), 2 + 2 * len(NAMES))
-_DETECTING = [0, 1, *(2 + NAMES.index(name) for name in DETECTING)]
+_DETECTING = [2 + NAMES.index(name) for name in DETECTING]
+SPREAD_FLOOR = np.array([0.1, 0.1, 1.0, 1.0, 1.0])
+"""Least spread of the logarithm of an error, 10 %, and of an evidence, that of white noise."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,13 +34,15 @@ class Past:
     stretch: float = 1.0
 
     def deviations(self, found: Comparison) -> Array:
-        """Of both errors and of the evidence of `DETECTING`, in robust spreads; less error is none."""
-        rows = self.rows[:, _DETECTING]
+        """Of the logarithm of both errors and of the evidence of `DETECTING`, in robust spreads.
+
+        Less error than usual is no deviation.
+        """
+        rows = _judged(self.stretch * self.rows)
         usual = np.median(rows, axis=0)
-        spread = 1.4826 * np.median(np.abs(rows - usual), axis=0)
-        spread = np.maximum(spread, [*(SPREAD_FLOOR * usual[:2]), *[EVIDENCE_FLOOR] * len(DETECTING)])
-        spread *= self.stretch * (1.0 + CAUTION * OVERLAP / len(rows))
-        deviation: Array = (_row(found)[_DETECTING] - self.stretch * usual) / spread
+        spread = np.maximum(1.4826 * np.median(np.abs(rows - usual), axis=0), SPREAD_FLOOR)
+        spread *= 1.0 + CAUTION * OVERLAP / len(rows)
+        deviation: Array = (_judged(_row(found)[None, :])[0] - usual) / spread
         deviation[:2] = np.maximum(deviation[:2], 0.0)
         return deviation
 
@@ -99,3 +101,8 @@ class PredictionHistory:
 
 def _row(found: Comparison) -> Array:
     return np.concatenate([found.errors, found.evidence, found.leverage, [found.squares, found.activity]])
+
+
+def _judged(rows: Array) -> Array:
+    """What may raise an alarm."""
+    return np.column_stack([np.log(np.maximum(rows[:, :2], 1e-6)), rows[:, _DETECTING]])
