@@ -22,14 +22,32 @@ LONGEST_TIME = 60.0  # s; slower wandering is current or leak, not a sensor
 FIRST_TIME = 1.0  # s, where the search begins
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WhitenedPass:
-    """Innovations (2, N), their variances (3, N), and the gain (2, N) and decay (2, N) of each row."""
+@dataclass(frozen=True, slots=True)
+class _Channel:
+    """One sensor's innovations (N,), their variances, and the gain and decay of each row."""
 
     error: Array
     variance: Array
     gain: Array
     decay: Array
+
+
+@dataclass(frozen=True, slots=True)
+class WhitenedPass:
+    """Both sensors over one recording."""
+
+    pitch: _Channel
+    depth: _Channel
+
+    @property
+    def error(self) -> Array:
+        """(2, N)."""
+        return np.stack([self.pitch.error, self.depth.error])
+
+    @property
+    def variance(self) -> Array:
+        """(3, N): the sensors' errors have nothing to do with one another."""
+        return np.stack([self.pitch.variance, 0.0 * self.pitch.variance, self.depth.variance])
 
 
 class WanderingSensors:
@@ -41,12 +59,13 @@ class WanderingSensors:
         self.least = np.array([1e-12, 1e-10, 1e-16, 1e-14, step, step])
         self.most = np.array([1e3, 1e6, 1e3, 1e6, LONGEST_TIME, LONGEST_TIME])
         self._runs: list[tuple[Array, Array, Array]] = []
+        self._known: dict[tuple[float, ...], _Channel] = {}
 
     def passes(self, point: Point) -> list[WhitenedPass]:
         """The free run's residuals through each sensor's filter."""
         return [
-            _filtered(residual, one, point.noise)
-            for residual, one in zip(self._residuals(point), self.inputs, strict=True)
+            WhitenedPass(*(self._channel(k, i, residual[i], point.noise) for i in range(2)))
+            for k, residual in enumerate(self._residuals(point))
         ]
 
     def whitened(self, point: Point, passes: list[WhitenedPass]) -> list[tuple[Array, Array]]:
@@ -54,15 +73,19 @@ class WanderingSensors:
         white = []
         for run, x0, one in zip(passes, point.initial, self.inputs, strict=True):
             _, sensitivity = innovations(point.parameters, x0, one)
-            deviation = np.sqrt(run.variance[::2])
-            scores = np.stack(
-                [
-                    _through(run.gain[i], run.decay[i], sensitivity[i]) * one.present[i] / deviation[i]
-                    for i in range(2)
-                ]
-            )
-            white.append((run.error / deviation, scores))
+            scores = np.empty_like(sensitivity)
+            for i, sensor in enumerate((run.pitch, run.depth)):
+                left = _through(sensor.gain, sensor.decay, sensitivity[i])
+                scores[i] = left * one.present[i] / np.sqrt(sensor.variance)
+            white.append((run.error / np.sqrt(run.variance[::2]), scores))
         return white
+
+    def _channel(self, recording: int, i: int, residual: Array, noise: Array) -> _Channel:
+        """While only one noise level changes, the other sensor stays as it was."""
+        key = (recording, i, *noise[i::2].tolist())
+        if key not in self._known:
+            self._known[key] = _filtered(residual, self.inputs[recording], i, *noise[i::2].tolist())
+        return self._known[key]
 
     def _residuals(self, point: Point) -> list[Array]:
         """Only noise levels change between most calls: the last free runs are kept."""
@@ -71,6 +94,7 @@ class WanderingSensors:
             for (parameters, x0, _), own in zip(self._runs, point.initial, strict=True)
         )
         if not kept:
+            self._known.clear()
             self._runs = [
                 (
                     point.parameters,
@@ -96,16 +120,13 @@ def coloured_noise(start: Fit, inputs: list[Inputs], most_steps: int = 15) -> Fi
     return replace(fit, wander=np.column_stack([noise[2:4], noise[4:]]))
 
 
-def _filtered(residual: Array, inputs: Inputs, noise: Array) -> WhitenedPass:
-    present, intervals = inputs.present, inputs.drive[3]
-    error, variance = np.zeros_like(residual), np.zeros((3, residual.shape[1]))
-    decay = np.exp(-intervals / noise[4:, None])
-    gain = np.empty_like(residual)
-    for i in range(2):
-        gain[i], S = _gains(present[i], decay[i], noise[i], noise[2 + i])
-        error[i] = present[i] * _through(gain[i], decay[i], residual[i][None])[0]
-        variance[2 * i] = S
-    return WhitenedPass(error=error, variance=variance, gain=gain, decay=decay)
+def _filtered(
+    residual: Array, inputs: Inputs, i: int, white: float, wandering: float, time: float
+) -> _Channel:
+    decay = np.exp(-inputs.drive[3] / time)
+    gain, variance = _gains(inputs.present[i], decay, white, wandering)
+    error = inputs.present[i] * _through(gain, decay, residual[None])[0]
+    return _Channel(error=error, variance=variance, gain=gain, decay=decay)
 
 
 def _gains(present: Array, decay: Array, white: float, wandering: float) -> tuple[Array, Array]:

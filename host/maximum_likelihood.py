@@ -97,7 +97,8 @@ def _noise_models(start: Fit, inputs: list[Inputs]) -> Iterator[Fit]:
     filtered = filter_error(start, inputs)
     yield filtered
     yield coloured_noise(start, inputs)
-    yield wave_forces(filtered, inputs)
+    if filtered.bic < start.bic:
+        yield wave_forces(filtered, inputs)
 
 
 def _like(chosen: Fit, start: Fit, inputs: list[Inputs]) -> Fit:
