@@ -2,8 +2,8 @@
 
 Once a second a reference model runs freely over the last seconds (`host.prediction_window`). What it misses
 is judged by what the same model missed before, while the vehicle moved at least as much: a rough sea, a
-nonlinear hull and a noisy sensor set their own level, and only a change of that level tells. The alarm is a
-mean of normalised deviations above a threshold, over some windows in a row.
+nonlinear hull and a noisy sensor set their own level, and only a change of that level tells. An alarm is a
+mean of normalised deviations, over some windows in a row, that is longer than a threshold.
 
 The reference is a snapshot of the live estimate, one to two minutes old and kept while anything looks
 suspicious, so that what the estimator learns of a fault cannot hide it.
@@ -44,10 +44,11 @@ SENTENCES = {
 LEVEL_WINDOWS = 60  # windows that set the units in which a channel's errors count
 SUSPICIOUS = 0.5  # of the threshold: from here on the reference is kept as it is
 NO_WORSE = 1.2  # ratio of prediction errors up to which a new snapshot is as good as the reference
+LONGEST_WAIT = 10  # windows for which an alarm that still grows waits: the moment of the change misleads
+LARGEST_RATIO = 655.0  # that is sent
 EXPLAINED = 0.2  # share of the excess error that a change must explain to be named
 AS_GOOD = 0.85  # of what the best change explains: one of another slot that explains more is as good
-PATIENCE = 8  # windows for which an alarm waits: one that holds the moment of the change misleads
-NAMING = 4  # of them, the last ones, that name the slot
+NAMING = 4  # windows, the last ones, that name the slot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,10 +61,10 @@ class MismatchConfig:
     )
     horizon: float | None = None  # s, > 0: length of a free run; default 10 T (10 s)
     period: float | None = None  # s, > 0: between two free runs; default a tenth of the horizon
-    persistence: int = 10  # free runs, 1 to 100, over which the deviation is averaged
-    threshold: float = 3.2  # > 0: mean deviation that is an alarm, in spreads of the same vehicle's past
+    persistence: int = 20  # free runs, 1 to 100, over which the deviation is averaged
+    threshold: float = 3.2  # > 0: length of the mean deviation that is an alarm, in spreads of the past
     memory: float = 1800.0  # s, > 0: past that sets the level
-    settling: float = 300.0  # s, >= 0: past without which nothing is judged, also after an alarm
+    settling: float = 180.0  # s, >= 0: past without which nothing is judged, also after an alarm
     refresh: float = 60.0  # s, > 0: between two snapshots of the live estimate
 
     def __post_init__(self) -> None:
@@ -108,12 +109,12 @@ class Mismatch:
     @property
     def notice(self) -> str:
         """At most 50 characters, for a ground station."""
-        return f"mils mismatch: {self.slot}, {self.channel} error x{min(self.ratio, 999.0):.1f}"
+        return f"mils mismatch: {self.slot}, {self.channel} error x{min(self.ratio, LARGEST_RATIO):.1f}"
 
     @property
     def values(self) -> dict[str, float]:
         """By the names that go onto the link."""
-        return {"mismatch": float(SLOTS.index(self.slot)), "mism_ratio": self.ratio}
+        return {"mismatch": float(SLOTS.index(self.slot)), "mism_ratio": min(self.ratio, LARGEST_RATIO)}
 
 
 class MismatchWatch:
@@ -155,6 +156,7 @@ class MismatchWatch:
     def _forget_recent(self) -> None:
         self._recent.clear()
         self._waited = 0
+        self._size = 0.0
 
     def clear(self) -> None:
         """Joins nothing across this moment: the vehicle rebooted, or its clock started anew."""
@@ -207,16 +209,18 @@ class MismatchWatch:
         self._recent.append((found, past.deviations(found)))
         if len(self._recent) < self._config.persistence:
             return None
-        latest = list(self._recent)[-self._config.persistence :]
-        highest = float(np.abs(np.mean([deviations for _, deviations in latest], axis=0)).max())
-        self._is_suspicious |= highest > SUSPICIOUS * self._config.threshold
+        deviations = np.array([deviation for _, deviation in self._recent])
+        size = float(np.linalg.norm(np.mean(deviations, axis=0)))
+        threshold = self._config.threshold
+        self._is_suspicious |= size > SUSPICIOUS * threshold
         if self._history.size < self._settling:
             return None
         self.current = None
-        if highest <= self._config.threshold and not self._waited:
+        is_growing, self._size = size > self._size, size
+        if size <= threshold and not self._waited:
             return None
         self._waited += 1
-        if self._waited < PATIENCE:
+        if is_growing and self._waited < LONGEST_WAIT:
             return None
         self.current = _explained([comparison for comparison, _ in self._recent][-NAMING:], past, t_us)
         self._begin()

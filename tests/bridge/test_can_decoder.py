@@ -276,6 +276,17 @@ def test_estimates_travel_in_the_default_dbc() -> None:
     assert encoder.counts["refused.not_encodable"] == 1
 
 
+def test_a_warning_travels_in_the_default_dbc() -> None:
+    encoder = CanEncoder(CanMap(kind="nmea2000"))
+    (packet,) = encoder.encode_warning(20_000_000, {"mismatch": 5.0, "mism_ratio": 2.34})
+    database = cantools.database.load_file(DEFAULT_DBC)
+    assert database.get_message_by_frame_id(packet.can_id).name == "MISMATCH"
+    seen = database.decode_message(packet.can_id, packet.data)
+    assert seen == {"time": 20.0, "mismatch": "actuator", "mism_ratio": pytest.approx(2.34)}
+    assert encoder.encode_warning(0, {"mismatch": 5.0, "mism_ratio": 1e6}) == []
+    assert encoder.counts["refused.not_encodable"] == 1
+
+
 @pytest.mark.parametrize(
     ("can_map", "words"),
     [

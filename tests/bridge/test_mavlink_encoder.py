@@ -118,6 +118,15 @@ def test_name_that_the_message_cannot_hold_is_refused(name: str) -> None:
         encoder().named_values(0, {name: 1.0})
 
 
+def test_a_warning_is_a_statustext() -> None:
+    (message,) = read_by_pymavlink(encoder().warning("mils mismatch: actuator, pitch error x3.1"))
+    assert message.get_type() == "STATUSTEXT"
+    assert message.text == "mils mismatch: actuator, pitch error x3.1"
+    assert message.severity == dialect.MAV_SEVERITY_WARNING
+    with pytest.raises(ValueError, match=r"1\.\.50 characters"):
+        encoder().warning(51 * "x")
+
+
 def test_rate_request_is_a_set_message_interval() -> None:
     (message,) = read_by_pymavlink(encoder().request_rate((1, 1), "ATTITUDE", 20.0))
     assert (message.target_system, message.target_component) == (1, 1)

@@ -103,7 +103,8 @@ def test_a_model_that_was_wrong_all_along_sets_its_own_level() -> None:
 
 
 def test_livelier_steering_of_a_wrong_model_is_no_mismatch() -> None:
-    assert alarms(dive(500.0, lively_at=400.0), replace(VEHICLE, b2=-3.5)) == []
+    told = alarms(dive(500.0, lively_at=400.0), replace(VEHICLE, b2=-3.5), settling=250.0)
+    assert told == []
 
 
 def test_it_arms_again_and_tells_the_next_change() -> None:
