@@ -66,10 +66,13 @@ def open_combinations(parameters: Array, covariance: Array, free: Mask) -> list[
     worthless = _worthless(parameters)
     scale = np.array([min(max(worthless[name], 1e-12), 1e12) for name in names])
     values, vectors = np.linalg.eigh(covariance[np.ix_(at, at)] / np.outer(scale, scale))
+    # Deviations if all others were known: what is open by itself is no matter of combinations.
+    alone = 1.0 / np.sqrt(np.sum(vectors**2 / np.maximum(values, 1e-12), axis=1))
     found = []
     for value, vector in zip(values[::-1], vectors.T[::-1], strict=True):
         largest = np.abs(vector).max()
-        parts = [k for k in np.argsort(-np.abs(vector)) if abs(vector[k]) > PART_OF_IT * largest]
+        order = [k for k in np.argsort(-np.abs(vector)) if alone[k] < 1.0]
+        parts = [k for k in order if abs(vector[k]) > PART_OF_IT * largest]
         if value > 1.0 and len(parts) > 1:
             change = {
                 names[k]: float(np.sqrt(value) * vector[k] * np.sign(vector[parts[0]]) * scale[k])
@@ -83,7 +86,9 @@ def ambiguity(parameters: Array, rival: Array) -> str:
     """A sentence about another mode that explains the recording almost as well."""
     values = zip(NAMES, parameters.tolist(), rival.tolist(), strict=False)
     apart = {
-        name: (one, other) for name, one, other in values if name in JUDGED and abs(other / one - 1) > 0.1
+        name: (one, other)
+        for name, one, other in values
+        if name in JUDGED and abs(other - one) > 0.1 * abs(one)
     }
     listed = ", ".join(f"{name} = {other:.4g} instead of {one:.4g}" for name, (one, other) in apart.items())
     return (

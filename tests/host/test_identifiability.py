@@ -58,6 +58,12 @@ def test_a_good_dive_leaves_no_combination_open() -> None:
     assert not any("known only together" in note or "Two answers" in note for note in result.notes)
 
 
+def test_parameters_that_nothing_shows_are_no_combination() -> None:
+    result = identify([fly(Dive(amplitude=0.0))[0]], default_vehicle())
+    assert {"b1", "b2"} <= set(result.undetermined)
+    assert not any("b2" in note and "known only together" in note for note in result.notes)
+
+
 def test_two_valleys_are_told() -> None:
     """Little motion under much noise: a slow hull that climbs by its planes, or a fast one that pitches."""
     dive = Dive(seed=7, duration=40.0, amplitude=0.1, pitch_noise=0.01, depth_noise=0.05)
