@@ -24,7 +24,7 @@ def test_shipped_scenario_loads_under_its_own_name(name):
 
 
 def test_shipped_scenarios_are_the_documented_ones():
-    assert SHIPPED == ["default", "fin_damage", "linear_noise_free", "rough_sea"]
+    assert SHIPPED == ["default", "fin_damage", "fin_lost", "linear_noise_free", "rough_sea"]
 
 
 def test_realistic_flavour_is_a_start_that_the_file_may_change():
