@@ -18,6 +18,7 @@ from firmware_model.status import Status
 from firmware_model.tally import Tally
 from firmware_model.time_grid import TimeGrid
 from firmware_model.validity import Validity
+from firmware_model.waiting_samples import WaitingSamples
 
 SCHEMA = 1
 ENTRIES = dict(zip(PARAMETERS, (A1, A2, A3, B1, B2), strict=True))
@@ -35,9 +36,10 @@ HIGHEST_SPEED = 50.0
 class RobustEstimator:
     """Estimates a1, a2, a3, b1, b2 and u0 from depth, pitch and stern plane while they come in.
 
-    Any value of a sample may be NaN, and samples may be missing: what was measured is used. A rudder that is
-    not measured is taken as held; if it comes back another, it turned once on the way, nobody knows when.
-    Without it for more than `rudder_hold` s the states of the vehicle start anew and the parameters are kept.
+    Any value of a sample may be NaN, and samples may be missing: what was measured is used. A sample without
+    a rudder waits for the next one that has it: if the rudder came back the same, it was held; if another,
+    it turned once on the way, nobody knows when. Without it for more than `rudder_hold` s the states of the
+    vehicle start anew and the parameters are kept.
     A measured speed is taken as it comes (the median of the last three), and held.
     """
 
@@ -57,8 +59,8 @@ class RobustEstimator:
         self._is_frozen = False
         self._speeds = [math.nan, math.nan, math.nan]
         self._outliers = {self._filter.pitch: 0, self._filter.depth: 0}
-        self._rudder = math.nan  # as held since the last sample; NaN while the states are not followed
-        self._held = 0  # instants since the rudder was measured
+        self._rudder = math.nan  # as measured last; NaN while the states are not followed
+        self._waiting = WaitingSamples(self._longest_hold)
         self._rest = 0.0  # s without excitation
         self._faults = 0
 
@@ -78,6 +80,8 @@ class RobustEstimator:
         if math.isnan(sample.depth) and math.isnan(sample.pitch) and math.isnan(sample.rudder):
             self._tally.samples += 1  # as good as missing: what it lacks is bridged with the next one
             return Status.WAITING
+        if math.isnan(sample.rudder) and not math.isnan(self._rudder):
+            return self._wait(sample, self._grid.missed + 1)
         self._filter.save()
         status = self._follow(sample, self._grid.missed)
         if not self._filter.is_finite:
@@ -89,6 +93,18 @@ class RobustEstimator:
         if self._tally.samples % self._check_period == 0:
             self._check()
         return status
+
+    def _wait(self, sample: Sample, instant: int) -> Status:
+        """Keeps a sample until the rudder is known, `instant` after it was known last."""
+        if instant <= self._waiting.newest:
+            return Status.REFUSED_STALE
+        self._tally.samples += 1
+        self._take_speed(sample.speed)
+        if instant > self._longest_hold:
+            self._lose_states()
+        else:
+            self._waiting.put(instant, sample.pitch, sample.depth)
+        return Status.WAITING
 
     def _recover(self) -> None:
         """Back to the last good estimate; after faults in a row the states start anew, or all stops."""
@@ -103,10 +119,11 @@ class RobustEstimator:
     def _lose_states(self) -> None:
         """The next sample that has a rudder starts the states anew."""
         self._rudder = math.nan
+        self._waiting.clear()
 
     def _follow(self, sample: Sample, missed: int) -> Status:
         """One sample of the grid that comes `missed` instants after the one before."""
-        if self._held + missed > self._longest_hold:
+        if missed > self._longest_hold:
             self._lose_states()
             self._rest = 0.0
             missed = 0
@@ -122,27 +139,28 @@ class RobustEstimator:
             self._filter.restart()
         else:
             self._bridge(sample.rudder, missed + 1, is_excited)
-        status = self._learn(sample)
-        self._hold_rudder(sample.rudder, missed + 1)
+        status = self._learn(sample.pitch, sample.depth)
+        self._rudder = sample.rudder
+        self._waiting.clear()
         return Status.RESTARTED if is_new and status is Status.UPDATED and self._tally.updates > 1 else status
 
     def _bridge(self, rudder: float, instants: int, is_excited: bool) -> None:
-        """Predicts to this sample, whose rudder is known at both ends of the way, or only at its beginning.
+        """Predicts to this sample, learning on the way from those that waited for its rudder.
 
         If it turned by `change` at one of n instants, each as likely, it has turned at instant j with the
         chance p = j/n: its mean is on a straight line, and its error has the variance p (1 - p) change^2 and
         lasts for n step/2, so that the moment it gives has the variance of the time at which the rudder
         turned.
         """
-        change = 0.0 if math.isnan(rudder) else rudder - self._rudder
-        step = self.config.step
-        # Instants that went by while the rudder was taken as held: the error they left is added at once.
-        doubt = change * change * step * self._held * self._held / 3.0
+        change = rudder - self._rudder
         for j in range(instants):
             p = j / instants
-            doubt += p * (1.0 - p) * change * change * instants * step / 2.0
+            doubt = p * (1.0 - p) * change * change * instants * self.config.step / 2.0
             self._filter.predict(self._rudder + p * change, is_excited, doubt)
-            doubt = 0.0
+            pitch, depth = self._waiting.at(j + 1)
+            if j + 1 < instants and not (math.isnan(pitch) and math.isnan(depth)):
+                self._pitch_motion.update(pitch)
+                self._tally.note(self._learn(pitch, depth))
 
     def _take_speed(self, speed: float) -> None:
         """The median of the last three measured speeds is the speed: one wrong value does nothing."""
@@ -169,11 +187,11 @@ class RobustEstimator:
         self._rest = 0.0 if is_excited else self._rest + instants * self.config.step
         return is_excited
 
-    def _learn(self, sample: Sample) -> Status:
+    def _learn(self, pitch_value: float, depth_value: float) -> Status:
         own = self._filter
         own.window.learn(own.ud)
-        pitch = self._learn_value(own.pitch, sample.pitch)
-        depth = self._learn_value(own.depth, sample.depth)
+        pitch = self._learn_value(own.pitch, pitch_value)
+        depth = self._learn_value(own.depth, depth_value)
         own.settle()
         if pitch is Status.UPDATED or depth is Status.UPDATED:
             self._tally.updates += 1
@@ -203,13 +221,6 @@ class RobustEstimator:
             self._filter.restart_depth()
         self._filter.learn(sensor, value)
         return Status.RESTARTED
-
-    def _hold_rudder(self, rudder: float, instants: int) -> None:
-        if math.isnan(rudder):
-            self._held += instants
-        else:
-            self._rudder = rudder
-            self._held = 0
 
     def _check(self) -> None:
         """Decides what is valid. Nothing is, that depends on a parameter at the bound of what it can be."""
@@ -287,7 +298,6 @@ class RobustEstimator:
         self._rudder_motion.reset()
         self._pitch_motion.reset()
         self._lose_states()
-        self._held = 0
         self._rest = 0.0
         self._faults = 0
         for sensor in self._outliers:

@@ -5,7 +5,7 @@ import math
 from firmware_model.noise_levels import LIKELY, ForceNoise, SensorNoise
 from firmware_model.ud_factors import UdFactors
 
-HUBER = 5.0
+HUBER = 3.0
 """Standard deviations beyond which a sample's influence does not grow any more."""
 
 

@@ -243,11 +243,45 @@ def test_a_rudder_that_stays_away_ends_the_states(trained):
     samples = dive(400, first=1200)
     run(estimator, samples[:100])
     without = [replace(sample, rudder=math.nan) for sample in samples[100:130]]
-    statuses = run(estimator, without)
-    assert set(statuses[:10]) == {Status.UPDATED}  # 1 s is held
-    assert set(statuses[11:]) == {Status.WAITING}
+    before = estimator.estimate().updates
+    assert set(run(estimator, without)) == {Status.WAITING}
+    assert estimator.estimate().updates == before
     assert estimator.update(samples[130]) is Status.RESTARTED
     assert set(run(estimator, samples[131:])) == {Status.UPDATED}
+    assert_found(estimator)
+
+
+def test_a_sample_without_a_rudder_is_used_once_it_is_known_that_it_was_held(trained):
+    held = np.repeat(held_levels(np.random.default_rng(4), 600)[::20], 20)
+    samples = dive(600, 4, rudder=held)
+    whole, late = estimator_of(trained), estimator_of(trained)
+    run(whole, samples)
+    for k, sample in enumerate(samples):
+        hidden = k % 20 in (5, 6, 7)
+        status = late.update(replace(sample, rudder=math.nan) if hidden else sample)
+        assert k == 0 or status is (Status.WAITING if hidden else Status.UPDATED)
+        if k % 20 == 6:
+            assert late.update(replace(sample, rudder=math.nan)) is Status.REFUSED_STALE
+    assert late.estimate().updates == whole.estimate().updates
+    for one, other in zip(learnt(late)["mean"], learnt(whole)["mean"], strict=True):
+        assert one == pytest.approx(other, rel=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.05])
+def test_a_storm_of_losses_and_spikes_does_not_make_it_confidently_wrong(share):
+    """60 % of each channel lost by itself, the rudder's too, and spikes of 30 deg and 5 m among the rest."""
+    rng = np.random.default_rng(12)
+    estimator = RobustEstimator(CONFIG)
+    for sample in dive(3000, 12):
+        lost, spiked = rng.random(3) < 0.6, rng.random(2) < share
+        estimator.update(
+            replace(
+                sample,
+                depth=math.nan if lost[0] else sample.depth + spiked[0] * rng.normal(0.0, 5.0),
+                pitch=math.nan if lost[1] else sample.pitch + spiked[1] * rng.normal(0.0, 0.5),
+                rudder=math.nan if lost[2] else sample.rudder,
+            )
+        )
     assert_found(estimator)
 
 
