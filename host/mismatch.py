@@ -62,7 +62,7 @@ class MismatchConfig:
     horizon: float | None = None  # s, > 0: length of a free run; default 10 T (10 s)
     period: float | None = None  # s, > 0: between two free runs; default a tenth of the horizon
     persistence: int = 20  # free runs, 1 to 100, over which the deviation is averaged
-    threshold: float = 3.2  # > 0: length of the mean deviation that is an alarm, in spreads of the past
+    threshold: float = 3.5  # > 0: length of the mean deviation that is an alarm, in spreads of the past
     memory: float = 1800.0  # s, > 0: past that sets the level
     settling: float = 240.0  # s, >= 0: past without which nothing is judged, also after an alarm
     refresh: float = 60.0  # s, > 0: between two snapshots of the live estimate

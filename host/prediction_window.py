@@ -245,7 +245,7 @@ def _best_start(error: Array, free: Array, levels: Array) -> tuple[Array, Array]
 def _fit(error: Array, free: Array, weight: Array) -> tuple[Array, Array]:
     columns = (free * weight[:, :, None]).reshape(-1, 4)
     target = (np.where(weight > 0.0, error, 0.0) * weight).reshape(-1)
-    start: Array = np.linalg.lstsq(columns, target, rcond=1e-9)[0]
+    start: Array = np.asarray(np.linalg.lstsq(columns, target, rcond=1e-9)[0], dtype=np.float64)
     left: Array = (target - columns @ start).reshape(error.shape)
     return start, left
 

@@ -13,7 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from firmware_model import EstimatorConfig, Sample, make_estimator
+from firmware_model.config import EstimatorConfig
+from firmware_model.estimator import make_estimator
+from firmware_model.sample import Sample
 from host.mismatch import Mismatch, MismatchConfig, MismatchWatch
 from host.prediction_window import Array, PredictionWindow, Reference
 from tools.sitl.effects import Timed
@@ -128,7 +130,8 @@ def errors(dive: Dive, window: PredictionWindow, reference: Reference, seconds: 
         window.push(dive.sample())
         if k % 10 == 9 and k >= 50 and window.is_full:
             found.append(window.compare(reference, LEVELS).errors)
-    return np.sqrt(np.mean(np.square(found), axis=0))
+    rms: Array = np.sqrt(np.mean(np.square(found), axis=0))
+    return rms
 
 
 def size_of(
