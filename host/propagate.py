@@ -20,7 +20,7 @@ NX0 = len(STATES)
 MOST_SUBSTEPS = 8  # slow records show no modes faster than their sampling: finer steps would resolve nothing
 LONGEST_SUBSTEP = 0.05  # s; for a 10 rad/s mode the error of one sub-step is below 3e-4 of its change
 LONGEST_DELAY = 1.0  # s; how far back commands are looked up
-FIXED_DRIVES = 5
+ROWS_AT_ONCE = 256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,26 +187,39 @@ def _carried_on(form: Form, x: ca.SX, S: ca.SX, p: ca.SX, drive: ca.SX) -> ca.SX
 OverRows = Callable[[Array, Array, Array], Array]
 
 
-@cache
 def over_rows(step: Callable[[Form], ca.Function], form: Form, rows: int) -> OverRows:
     """One step's function carried over N rows: (start, per row (m, N), parameters) -> results (k, N)."""
-    accumulated = step(form).mapaccum(f"rows_{rows}", rows)
-    results = accumulated.size2_out(1), accumulated.size1_out(1)
+    at_once = min(ROWS_AT_ONCE, 1 << (rows - 1).bit_length())
+    accumulated = _accumulated(step, form, at_once)
 
     def run(start: Array, per_row: Array, parameters: Array) -> Array:
         # CasADi reads and writes these arrays in place, column by column; its own matrices would be
         # copied number by number, which takes as long as the propagation.
-        own = [start, np.ascontiguousarray(per_row.T), np.tile(parameters, (rows, 1))]
-        out = np.empty(results)
+        chunks = -(-rows // at_once)
+        driven = np.zeros((chunks * at_once, per_row.shape[0]))
+        driven[:rows] = per_row.T
+        repeated = np.tile(parameters, (at_once, 1))
+        carried = np.empty((at_once, accumulated.size1_out(0)))
+        out = np.empty((chunks * at_once, accumulated.size1_out(1)))
         buffer: Any
         buffer, evaluate = accumulated.buffer()  # typed in C terms: pointer and size
-        for k, argument in enumerate(own):
-            buffer.set_arg(k, argument.data)
-        buffer.set_res(1, out.data)
-        evaluate()
-        return out.T
+        buffer.set_arg(2, repeated.data)
+        buffer.set_res(0, carried.data)
+        for first in range(0, chunks * at_once, at_once):
+            begin = np.array(carried[-1]) if first else start
+            buffer.set_arg(0, begin.data)
+            buffer.set_arg(1, driven[first : first + at_once].data)
+            buffer.set_res(1, out[first : first + at_once].data)
+            evaluate()
+        return out[:rows].T
 
     return run
+
+
+@cache
+def _accumulated(step: Callable[[Form], ca.Function], form: Form, rows: int) -> ca.Function:
+    """Over few rows: CasADi takes longer to build such a function over many than to run it."""
+    return step(form).mapaccum(f"rows_{rows}", rows)
 
 
 def form_of(inputs: Inputs) -> Form:

@@ -195,9 +195,8 @@ class Fitter:
         inputs, free = self.inputs(names), self.free(names)
         before = sum(float(np.nansum(e**2)) for e in parent.fit.whitened)
         has_sea = parent.fit.has_process_noise
-        own = self._probes(effect, parent)
         probed = []
-        for probe in [*values, *own[:1]] if values else own:
+        for probe in values or self._probes(effect, parent):
             point = self._point(names, parent, effect.name, probe)
             with np.errstate(over="ignore", invalid="ignore"):
                 white = (whitened_innovations if has_sea else residuals_at)(point, inputs)
@@ -228,7 +227,8 @@ class Fitter:
             return [slowest]
         # Depth is the integral of the water's motion: a fine grid, as phases drift over the whole span.
         frequencies = np.arange(1.0 / slowest, 1.0 / limits[0], 0.25 / span)
-        power = lombscargle(time[known], residual[known], 2.0 * np.pi * frequencies, precenter=True)
+        centred = residual[known] - residual[known].mean()
+        power = lombscargle(time[known], centred, 2.0 * np.pi * frequencies)
         periods: list[float] = []
         for k in np.argsort(-power * frequencies**2):
             if all(abs(frequencies[k] - 1.0 / other) > 1.0 / span for other in periods):

@@ -3,17 +3,21 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 from scipy.signal import periodogram
 from scipy.stats import chi2
 
 from host.catalogue.nuisance import ANY_SMOOTH_FORCE
 from host.diagnosis.fitter import Explanation, Fitter
 from host.diagnosis.noise_floor import is_quantised
-from host.recording import Array
+from host.recording import Array, Recording
 from host.whiteness import is_white
 
 SIGNIFICANCE = 1e-4
+GROUPS = 10
+MOVEMENT_SPAN = 0.5  # s
 FLOOR_DOUBT = 1.3  # times the noise floor, which is itself estimated
+ROUNDING_DOUBT = 2.0  # the same where rounding rules: noise adds to it and is hidden by it
 SLOW_SPREAD = 2.3  # of the cumulative periodogram (Kolmogorov's distribution at 5e-5)
 
 
@@ -22,33 +26,65 @@ class Leftover:
     """Signs that something is left.
 
     is_coloured     the innovations are not white, fast or slow
+    is_local        they are larger in one range of the motion than in another, as those of no sea are
     is_above_floor  the sensor noise of the fit exceeds what the sensors themselves show
     smooth_gain     twice the log-likelihood that any smooth force of the motion would gain
     is_smooth       whether that is more than chance gives
     """
 
     is_coloured: bool
+    is_local: bool
     is_above_floor: bool
     smooth_gain: float
     is_smooth: bool
 
     @property
     def is_nothing(self) -> bool:
-        return not (self.is_coloured or self.is_above_floor or self.is_smooth)
+        return not (self.is_coloured or self.is_local or self.is_above_floor or self.is_smooth)
 
 
 def leftover(fitter: Fitter, best: Explanation) -> Leftover:
     """Tests the innovations of an explanation, but for quantised channels: rounding is no white noise."""
-    tested = ~is_quantised(fitter.recordings)
+    rounded = is_quantised(fitter.recordings)
+    tested = ~rounded
+    doubt = np.where(rounded, ROUNDING_DOUBT, FLOOR_DOUBT)
     innovations = [e[tested] for e in best.fit.whitened]
     gain = fitter.gain(best, ANY_SMOOTH_FORCE.name, [])
     terms = len(ANY_SMOOTH_FORCE.parameters)
     return Leftover(
         is_coloured=not all(is_white(e, significance=SIGNIFICANCE) and _is_even(e) for e in innovations),
-        is_above_floor=fitter.excess(best.fit) > FLOOR_DOUBT,
+        is_local=_is_local(fitter.recordings, innovations),
+        is_above_floor=bool((best.fit.noise[:2] > doubt * fitter.floor).any()),
         smooth_gain=gain,
         is_smooth=bool(gain > chi2.isf(SIGNIFICANCE, terms)),
     )
+
+
+def _is_local(recordings: list[Recording], innovations: list[Array]) -> bool:
+    """Whether the squared innovations differ between tenths of plane angle, plane movement or pitch.
+
+    The means of ten groups of n white squares scatter by the kurtosis over n; their chi2 has 9 degrees.
+    """
+    squares = np.concatenate([np.nanmean(np.atleast_2d(e**2), axis=0) for e in innovations])
+    moved = [np.abs(np.gradient(gaussian_filter1d(r.rudder, MOVEMENT_SPAN / r.step))) for r in recordings]
+    for quantity in (
+        np.concatenate([r.rudder for r in recordings]),
+        np.concatenate(moved),
+        np.concatenate([_filled(r.pitch) for r in recordings]),
+    ):
+        known = np.isfinite(squares)
+        values = squares[known]
+        groups = np.array_split(np.argsort(quantity[known], kind="stable"), GROUPS)
+        means = np.array([values[group].mean() for group in groups])
+        scatter = np.array([values.var() / group.size for group in groups])
+        if np.sum((means - values.mean()) ** 2 / scatter) > chi2.isf(SIGNIFICANCE, GROUPS - 1):
+            return True
+    return False
+
+
+def _filled(values: Array) -> Array:
+    known = np.flatnonzero(np.isfinite(values))
+    return np.asarray(np.interp(np.arange(values.size), known, values[known]))
 
 
 def _is_even(innovations: Array) -> bool:

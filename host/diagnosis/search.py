@@ -18,12 +18,12 @@ from host.recording import Array
 
 NAMING_MARGIN = 10.0  # of BIC, beyond which an effect pays; holds false naming down over the whole catalogue
 TWIN_MARGIN = 6.0  # of BIC, odds of 20 to 1: explanations closer than this cannot be told apart
-BEAM = 4
-HOPELESS = 400.0  # of BIC behind the best: such a set is no parent once another reaches the noise
+BEAM = 4  # sets carried on
+FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
 PROMISING = 6
 RIVALS = 5
 LARGEST_SET = 5
-NEAR = 1.15  # times the noise floor: little is left, and gains are small and well predicted
+NEAR = 1.15  # times the noise floor: little is left, and gains are well predicted
 MOST_ROUNDS = 6
 
 Progress = Callable[[str], None]
@@ -52,11 +52,9 @@ class Search:
         for size in range(1, LARGEST_SET + 1):
             grown = self._grown(beam, size)
             best_before = min(e.bic for e in beam)
-            beam = sorted(grown, key=lambda e: e.bic)[:BEAM]
+            beam = self._parents(grown)
             if not beam or beam[0].bic > best_before - NAMING_MARGIN:
                 break
-            if self.fitter.excess(beam[0].fit) < NEAR:
-                beam = [e for e in beam if e.bic < beam[0].bic + HOPELESS]
         return self._settled()
 
     def twins(self, best: Explanation, name: str) -> list[str]:
@@ -80,6 +78,12 @@ class Search:
             others = [name for name in others if name not in OFFSETS]
         found = self.workers.results([("gain", (parent, name, self._values(name))) for name in others])
         return dict(zip(others, found, strict=True))
+
+    def _parents(self, grown: list[Explanation]) -> list[Explanation]:
+        """The best sets, as far as they explain a fair part of what the very best does."""
+        ordered = sorted(grown, key=lambda e: e.bic)[:BEAM]
+        gains = [self.root.bic - e.bic for e in ordered]
+        return [e for e, gain in zip(ordered, gains, strict=True) if gain > FAIR_PART * gains[0]]
 
     def _grown(self, parents: list[Explanation], size: int) -> list[Explanation]:
         tasks: dict[Names, Task] = {}
