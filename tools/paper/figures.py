@@ -262,10 +262,8 @@ def missing_figure(found: Study) -> str:
             if d == 0:
                 axis.set_ylabel(label)
     keys = [Line2D([], [], color=m.colour, marker="o", markersize=3, label=m.name) for m in found.methods]
-    keys += [
-        Line2D([], [], color="k", linestyle=style, linewidth=1.3, label=pattern)
-        for style, pattern in zip(("-", "--"), PATTERNS, strict=True)
-    ]
+    keys.append(Line2D([], [], color="k", linestyle="-", linewidth=1.3, label=PATTERNS[0]))
+    keys.append(Line2D([], [], color="k", linestyle="--", linewidth=1.3, label=PATTERNS[1]))
     figure.legend(handles=keys, loc="upper center", bbox_to_anchor=(0.5, 0.01), frameon=False, ncols=4)
     figure.tight_layout()
     return data_uri(figure)
