@@ -15,6 +15,7 @@ import numpy as np
 
 from host.equations import BASE, STATES, Structure
 from host.recording import Array, Recording
+from host.speed import smoothed_speed
 
 NX0 = len(STATES)
 MOST_SUBSTEPS = 8  # slow records show no modes faster than their sampling: finer steps would resolve nothing
@@ -46,7 +47,7 @@ def inputs_of(
     """Inputs of one recording. Longer sub-steps (s) suit vehicles whose modes are known to be slow."""
     intervals = recording.intervals
     known = np.full(intervals.size, float(recording.has_speed))
-    speed = recording.speed if recording.has_speed else np.zeros(intervals.size)
+    speed = smoothed_speed(recording.speed) if recording.has_speed else np.zeros(intervals.size)
     lags = int(np.ceil(LONGEST_DELAY / recording.step)) + 1 if structure.needs_lags else 0
     earlier = [
         np.concatenate([np.full(min(lag, intervals.size), recording.rudder[0]), recording.rudder])[

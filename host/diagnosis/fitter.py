@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from math import log
 
 import numpy as np
-from scipy.signal import lombscargle
 
 from host.catalogue import named, structure_of
 from host.catalogue.nuisance import FREE_TRIM
@@ -20,7 +19,7 @@ from host.recording import Array, Recording
 
 Names = frozenset[str]
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
-RARITY = 4.0  # of BIC, odds of 7 to 1 against what not every vehicle has: decides between exact twins
+RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exact twins
 FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
 # Enough to rank sets; those that count are polished.
 FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 3, 12, 0.5
@@ -219,23 +218,21 @@ class Fitter:
     def _periods(self, limits: tuple[float, float], fit: Fit) -> list[float]:
         """The strongest periods in the depth residuals of the longest recording, s."""
         longest = max(range(len(self.recordings)), key=lambda k: self.recordings[k].duration)
-        time, residual = self.recordings[longest].time, fit.whitened[longest][1]
-        known = np.isfinite(residual)
-        span = float(np.ptp(time[known]))
-        slowest = min(limits[1], 1.5 * span)
-        if slowest <= limits[0]:
-            return [slowest]
-        # Depth is the integral of the water's motion: a fine grid, as phases drift over the whole span.
-        frequencies = np.arange(1.0 / slowest, 1.0 / limits[0], 0.25 / span)
-        centred = residual[known] - residual[known].mean()
-        power = lombscargle(time[known], centred, 2.0 * np.pi * frequencies)
+        step, residual = self.recordings[longest].step, fit.whitened[longest][1]
+        filled = np.where(np.isfinite(residual), residual - np.nanmean(residual), 0.0)
+        # Padded fourfold, as phases drift over the whole span; depth is the integral of the water's motion.
+        rows = 4 * filled.size
+        frequencies = np.fft.rfftfreq(rows, step)[1:]
+        velocity = np.abs(np.fft.rfft(filled, rows))[1:] * frequencies
+        span = step * filled.size
+        inside = (frequencies >= 1.0 / min(limits[1], 1.5 * span)) & (frequencies <= 1.0 / limits[0])
         periods: list[float] = []
-        for k in np.argsort(-power * frequencies**2):
+        for k in np.flatnonzero(inside)[np.argsort(-velocity[inside])]:
             if all(abs(frequencies[k] - 1.0 / other) > 1.0 / span for other in periods):
                 periods.append(float(1.0 / frequencies[k]))
             if len(periods) == PERIODS_TRIED:
                 break
-        return periods
+        return periods or [limits[0]]
 
     def _guess(self, start: Point, names: Names) -> Point:
         """The rough values of regression where it gives some, `start` elsewhere, moved into their valley."""

@@ -1,5 +1,6 @@
 """What the best explanation leaves: nothing, or something systematic that no entry of the catalogue is."""
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,7 +66,9 @@ def _is_local(recordings: list[Recording], innovations: list[Array]) -> bool:
 
     The means of ten groups of n white squares scatter by the kurtosis over n; their chi2 has 9 degrees.
     """
-    squares = np.concatenate([np.nanmean(np.atleast_2d(e**2), axis=0) for e in innovations])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # rows without any measurement
+        squares = np.concatenate([np.nanmean(np.atleast_2d(e**2), axis=0) for e in innovations])
     moved = [np.abs(np.gradient(gaussian_filter1d(r.rudder, MOVEMENT_SPAN / r.step))) for r in recordings]
     for quantity in (
         np.concatenate([r.rudder for r in recordings]),

@@ -18,6 +18,7 @@ from host.recording import Array
 
 NAMING_MARGIN = 10.0  # of BIC, beyond which an effect pays; holds false naming down over the whole catalogue
 TWIN_MARGIN = 6.0  # of BIC, odds of 20 to 1: explanations closer than this cannot be told apart
+LARGEST_CLASS = 3  # a longer list of alternatives helps nobody
 BEAM = 4  # sets carried on
 FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
 PROMISING = 6
@@ -58,14 +59,14 @@ class Search:
         return self._settled()
 
     def twins(self, best: Explanation, name: str) -> list[str]:
-        """Effects that would do the work of one member as well, closest first."""
+        """The effects that would do the work of one member as well, or nearly: the two closest."""
         others = {
             next(iter(names - best.names)): explanation.bic - best.bic
             for names, explanation in self.tried.items()
             if len(names) == len(best.names) and best.names - names == {name} and FREE_TRIM.name not in names
         }
         close = {other: lag for other, lag in others.items() if lag < TWIN_MARGIN}
-        return sorted(close, key=lambda other: close[other])
+        return sorted(close, key=lambda other: close[other])[: LARGEST_CLASS - 1]
 
     def without(self, best: Explanation, name: str) -> Explanation:
         """The set less one member, as found while settling."""
@@ -150,12 +151,12 @@ class Search:
     def _retrimmed(self) -> Explanation:
         """The leading sets with the free trim explained by as few of the offsets as will do."""
         free = sorted((e for e in self.tried.values() if FREE_TRIM.name in e.names), key=lambda e: e.bic)
-        free = [e for e in free[:BEAM] if e.bic < free[0].bic + 4.0 * NAMING_MARGIN]
+        free = [e for e in free[:BEAM] if e.bic < free[0].bic + 2.0 * NAMING_MARGIN]
         polished = [self._remember(e) for e in self.workers.results([("polished", (e,)) for e in free])]
         leading = min(polished, key=lambda e: e.bic)
         explained = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
-        for count in range(3):
-            ways = [frozenset(ways) for ways in combinations(OFFSETS, count)]
+        for counts in ((0, 1), (2,)):
+            ways = [frozenset(way) for count in counts for way in combinations(OFFSETS, count)]
             tasks = [("retrimmed", (e, way)) for e in polished for way in ways]
             explained += [self._remember(e) for e in self.workers.results(tasks)]
             best = min(explained, key=lambda e: e.bic)

@@ -1,0 +1,25 @@
+"""A noisy speed sensor does not drive the depth."""
+
+import numpy as np
+import pytest
+
+from host.speed import smoothed_speed
+
+
+def test_a_constant_speed_gives_its_mean() -> None:
+    rng = np.random.default_rng(1)
+    measured = 1.5 + 0.01 * rng.standard_normal(2000)
+    assert np.abs(smoothed_speed(measured) - 1.5).max() < 0.002
+
+
+def test_a_wandering_speed_is_followed() -> None:
+    rng = np.random.default_rng(2)
+    truth = 1.5 + 0.3 * np.sin(np.arange(2000) / 150.0)
+    found = smoothed_speed(truth + 0.01 * rng.standard_normal(2000))
+    assert np.sqrt(np.mean((found - truth) ** 2)) < 0.004
+
+
+def test_a_speed_without_noise_is_kept() -> None:
+    truth = 1.5 + 0.3 * np.sin(np.arange(500) / 10.0)
+    assert smoothed_speed(truth) == pytest.approx(truth, abs=2e-3)
+    assert smoothed_speed(np.full(100, 2.0)) == pytest.approx(np.full(100, 2.0))
