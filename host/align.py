@@ -1,9 +1,10 @@
 """Asynchronous measurements to samples on the fixed grid of the estimator. Gaps stay gaps."""
 
 from bisect import bisect_right
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import dataclass
-from math import nan
+from itertools import pairwise
+from math import inf, nan
 
 from bridge.measurement import Measurement, Quantity
 from firmware_model.sample import Sample
@@ -17,6 +18,13 @@ _ON_GRID = 0.01
 # So many measurements refused in a row as older than their channel mean that the clock was set back.
 _CLOCK_SET_BACK = 20
 
+# An interval longer than so many usual ones has lost a measurement: halfway between none and one.
+_LOST_ONE = 1.5
+
+# Of the last so many intervals, this share is taken for too short to have lost one, however many are lost.
+_INTERVALS = 32
+_SHARE = 0.2
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlignConfig:
@@ -29,6 +37,7 @@ class AlignConfig:
     step: float = 0.1  # s, > 0: the grid, and the estimator's interval h
     max_gap: float | None = None  # s, >= step: longest bracket that is interpolated; default 2.5 steps
     rudder_hold: float | None = None  # s, > 0: how long a rudder command is held; default 1 s or 2.5 steps
+    rudder_on_change: bool = False  # it is sent only when it changes: silence means that it is as it was
     latency: float | None = None  # s, >= max_gap: wait for a late channel; default 0.5 s or max_gap
     split_gap: float | None = None  # s, > latency: a silence that starts anew; default 5 s or 10 steps
 
@@ -69,6 +78,7 @@ class _Channel:
     def __init__(self) -> None:
         self.times: list[int] = []
         self.values: list[float] = []
+        self._intervals: deque[int] = deque(maxlen=_INTERVALS)  # before those that are kept
 
     def append(self, t_us: int, value: float) -> None:
         self.times.append(t_us)
@@ -78,6 +88,7 @@ class _Channel:
         """Drops what no instant from `t_us` on can need: all but the last at or before it."""
         old = bisect_right(self.times, t_us) - 1
         if old > 0:
+            self._intervals.extend(after - before for before, after in pairwise(self.times[: old + 1]))
             del self.times[:old], self.values[:old]
 
     def interpolated(self, t_us: int, max_gap_us: int, near_us: int) -> float:
@@ -101,13 +112,40 @@ class _Channel:
             return nan
         return self.values[last]
 
+    @property
+    def _usual_interval(self) -> float:
+        """Mean of the recent intervals in which nothing was lost; inf before there are any."""
+        if not self._intervals:
+            return inf
+        short = sorted(self._intervals)[int(_SHARE * len(self._intervals))]
+        whole = [interval for interval in self._intervals if interval <= _LOST_ONE * short]
+        return sum(whole) / len(whole)
+
+    def has_lost_change(self, t_us: int, known_to_us: int, near_us: int) -> bool:
+        """Whether a measurement that could have told of a change by `t_us` was lost.
+
+        The last value holds until the next one is due. Beyond that it holds if the next one was not lost, or
+        says the same. What came after `known_to_us` is not looked at.
+        """
+        following = bisect_right(self.times, t_us + near_us)
+        if following == 0:
+            return False
+        since, usual = self.times[following - 1], self._usual_interval
+        if t_us + near_us < since + usual:
+            return False
+        if following == len(self.times) or self.times[following] > known_to_us:
+            return known_to_us - since > _LOST_ONE * usual
+        is_same = self.values[following] == self.values[following - 1]
+        return self.times[following] - since > _LOST_ONE * usual and not is_same
+
 
 class Aligner:
     """Turns measurements, pushed in the order in which they came, into samples at whole steps.
 
     Depth, pitch, speed and pitch rate at an instant are the measurement itself or the straight line between
-    its two neighbours; nothing is extrapolated. The rudder is a command that the actuator holds. An instant
-    is complete when every channel has passed it, or when one is `latency` beyond it. The grid starts at the
+    its two neighbours; nothing is extrapolated. The rudder is a command that the actuator holds; where a
+    message was lost and the next one differs, it is unknown from when the lost one was due. An instant is
+    complete when every channel has passed it, or when one is `latency` beyond it. The grid starts at the
     first pitch measurement, the signal that interpolation would harm most.
 
     The result does not depend on how channels interleave as long as they lag one another by less than
@@ -126,6 +164,7 @@ class Aligner:
         self._step_us = round(config.step * 1e6)
         self._max_gap_us = round(config.max_gap_s * 1e6)
         self._hold_us = round(config.rudder_hold_s * 1e6)
+        self._rudder_on_change = config.rudder_on_change
         self._latency_us = round(config.latency_s * 1e6)
         self._split_us = round(config.split_gap_s * 1e6)
         self._near_us = round(_ON_GRID * config.step * 1e6)
@@ -222,7 +261,7 @@ class Aligner:
         at: dict[Quantity, float] = {}
         for quantity, channel in self._channels.items():
             if quantity is _HELD:
-                at[quantity] = channel.held(t_us, self._hold_us, self._near_us)
+                at[quantity] = self._held(channel, t_us)
             else:
                 at[quantity] = channel.interpolated(t_us, self._max_gap_us, self._near_us)
             channel.forget_before(t_us)
@@ -236,3 +275,11 @@ class Aligner:
             speed=at[Quantity.SPEED],
             pitch_rate=at[Quantity.PITCH_RATE],
         )
+
+    def _held(self, channel: _Channel, t_us: int) -> float:
+        assert self._newest is not None
+        # Further on, how much has come depends on how the channels interleave.
+        known_to_us = min(self._newest, t_us + self._max_gap_us)
+        if not self._rudder_on_change and channel.has_lost_change(t_us, known_to_us, self._near_us):
+            return nan
+        return channel.held(t_us, self._hold_us, self._near_us)

@@ -118,11 +118,12 @@ class PredictionWindow:
         self._step = step
         self._rows = np.full((samples, 4), math.nan)  # pitch, depth, rudder, speed
         self._filled = 0
+        self._unheard = 0  # samples in a row without a plane
         self._t_us: int | None = None
 
     def clear(self) -> None:
         """Joins nothing across this moment."""
-        self._filled = 0
+        self._filled = self._unheard = 0
         self._t_us = None
 
     def push(self, sample: Sample) -> None:
@@ -131,12 +132,18 @@ class PredictionWindow:
             self.clear()
         self._t_us = sample.t_us
         last = self._rows[-1] if self._filled else np.full(4, math.nan)
-        # A plane that is not heard is held, and so is a speed.
-        rudder = last[2] if math.isnan(sample.rudder) else sample.rudder
+        # A plane that is not heard is held until it is heard again, and so is a speed.
+        is_heard = not math.isnan(sample.rudder)
+        rudder = sample.rudder if is_heard else last[2]
         speed = last[3] if math.isnan(sample.speed) else sample.speed
         self._rows[:-1] = self._rows[1:]
         self._rows[-1] = sample.pitch, sample.depth, rudder, speed
         self._filled = min(self._filled + 1, len(self._rows))
+        if is_heard and self._unheard:
+            # It turned on the way, nobody knows when.
+            way = min(self._unheard + 2, len(self._rows))
+            self._rows[-way:, 2] = np.linspace(self._rows[-way, 2], rudder, way)
+        self._unheard = 0 if is_heard else self._unheard + 1
 
     @property
     def is_full(self) -> bool:

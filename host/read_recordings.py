@@ -1,6 +1,7 @@
 """Any recording to its stretches on the time grid: text, telemetry, dataflash, CAN logs, the journal."""
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from host.align import Aligner
 from host.csv_recording import read_csv_recording
 from host.errors import RecordingError
 from host.journal import JournalReading, read_journal
-from host.recording import NEEDED, Recording, file_sha256, split_at_gaps
+from host.recording import NEEDED, Array, Recording, file_sha256, split_at_gaps
 from host.vehicle import Vehicle
 
 
@@ -51,7 +52,9 @@ def _aligned(
     pieces = []
     for samples in filter(None, segments.values()):
         whole = _recording(path.name, digest, samples, vehicle.alignment.step, total, tuple(reading.notes))
-        pieces += split_at_gaps(whole, max(1.0, 2.5 * whole.step), needs)
+        longest = max(1.0, 2.5 * whole.step)
+        whole = replace(whole, rudder=_bridged(whole.rudder, round(longest / whole.step)))
+        pieces += split_at_gaps(whole, longest, needs)
     if not pieces:
         lacking = [name for name in needs if not seen[name]]
         reason = f"no {' and no '.join(lacking)} in it" if lacking else "never all at once for 10 steps"
@@ -60,6 +63,17 @@ def _aligned(
             "check the vehicle file's channels (`--vehicle`)"
         )
     return pieces
+
+
+def _bridged(rudder: Array, longest: int) -> Array:
+    """Losses of up to `longest` rows on a straight line: the plane turned on the way, nobody knows when."""
+    rows, known = np.arange(rudder.size), np.isfinite(rudder)
+    before = np.maximum.accumulate(np.where(known, rows, -1))
+    after = np.minimum.accumulate(np.where(known, rows, rudder.size)[::-1])[::-1]
+    is_short = (before >= 0) & (after < rudder.size) & (after - before <= longest + 1)
+    share = (rows - before) / np.maximum(after - before, 1)
+    line = (1.0 - share) * rudder[before] + share * rudder[np.minimum(after, rudder.size - 1)]
+    return np.where(is_short & ~known, line, rudder)
 
 
 def _recording(

@@ -78,6 +78,73 @@ def test_the_rudder_is_held_and_then_unknown() -> None:
     assert all(isnan(value) for k, value in enumerate(values) if not 3 <= k < 13)
 
 
+def rudder_seen(rudder: list[Measurement], config: AlignConfig | None = None) -> list[float]:
+    """The rudder of the samples at 0.0, 0.1, ... 6.0 s beside a pitch that is never late."""
+    pitch = [at(PITCH, k * 0.1, 0.0) for k in range(61)]
+    return [s.rudder for s in align(sorted(pitch + rudder, key=lambda m: m.t_us), config)]
+
+
+def stepping(period: float, lost: tuple[int, ...] = ()) -> list[Measurement]:
+    """A rudder that is sent every `period` s and is never twice the same."""
+    count = round(6.0 / period) + 1
+    return [at(RUDDER, k * period, float(k)) for k in range(count) if k not in lost]
+
+
+def test_a_rudder_that_changed_while_messages_were_lost_is_unknown() -> None:
+    values = rudder_seen(stepping(0.1, lost=(30, 40, 41)))
+    assert [k for k, value in enumerate(values) if isnan(value)] == [30, 40, 41]
+    assert values[29:32:2] == [29.0, 31.0]
+
+
+def test_a_rudder_that_comes_back_the_same_was_held() -> None:
+    measurements = [at(RUDDER, k * 0.1, 0.1 if k < 40 else 0.2) for k in range(61) if k not in (30, 31, 40)]
+    values = rudder_seen(measurements)
+    assert values[:40] == [0.1] * 40
+    assert isnan(values[40])
+    assert values[41:] == [0.2] * 20
+
+
+@pytest.mark.parametrize("period", [0.02, 0.05, 0.1, 0.13, 0.25, 0.5, 0.8])
+def test_a_rudder_of_any_rate_is_held_until_the_next_message(period: float) -> None:
+    values = rudder_seen(stepping(period))
+    last = 6.0 if period in (0.02, 0.05, 0.1, 0.25, 0.5) else 5.5
+    assert [int(value) for value in values[: round(last * 10)]] == [
+        int(k * 0.1 / period + 1e-6) for k in range(round(last * 10))
+    ]
+
+
+def test_a_rudder_that_lost_a_message_between_two_samples_holds_until_that_was_due() -> None:
+    off_grid = [at(RUDDER, 0.05 + k * 0.1, float(k)) for k in range(60) if k != 30]
+    values = rudder_seen(off_grid)
+    assert values[30] == 29.0  # at 2.95 s, and the next was due at 3.05 s
+    assert isnan(values[31])
+    assert values[32] == 31.0
+
+
+def test_a_rudder_with_jitter_loses_nothing() -> None:
+    random = Random(1)
+    values = rudder_seen([at(RUDDER, k * 0.1 + random.uniform(-0.02, 0.02), float(k)) for k in range(1, 61)])
+    assert not any(isnan(value) for value in values[2:])
+
+
+def test_the_usual_interval_is_found_although_most_messages_are_lost() -> None:
+    random = Random(2)
+    lost = tuple(k for k in range(1, 121) if random.random() < 0.6)
+    came = stepping(0.05, lost)
+    known = {round(m.t_us / 1e5, 1) for m in came}
+    unknown = [k for k, value in enumerate(rudder_seen(came)) if isnan(value)]
+    # An instant that has a message is known; one that has none, and none 0.05 s before, is not.
+    assert not any(k in known for k in unknown)
+    assert {k for k in range(20, 60) if k not in known and k - 0.5 not in known} <= set(unknown)
+
+
+def test_a_rudder_sent_on_change_is_held_through_the_silence() -> None:
+    turns = [at(RUDDER, time, time) for time in (0.0, 0.1, 0.2, 0.3, 0.4, 2.0, 2.1, 5.0)]
+    held = rudder_seen(turns, AlignConfig(rudder_on_change=True, rudder_hold=10.0))
+    assert held == [max(m.value for m in turns if m.t_us <= k * STEP_US) for k in range(61)]
+    assert isnan(rudder_seen(turns)[10])
+
+
 def test_a_silent_channel_delays_by_the_latency_and_no_more() -> None:
     aligner = Aligner(AlignConfig(latency=0.5))
     out: list[Sample] = []

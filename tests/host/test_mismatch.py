@@ -167,6 +167,17 @@ def test_outliers_and_gaps_of_a_sensor_do_no_harm() -> None:
     assert hurt == pytest.approx(clean, rel=0.3)
 
 
+def test_a_plane_that_was_not_heard_for_a_while_was_on_its_way() -> None:
+    windows = PredictionWindow(100, H), PredictionWindow(100, H)
+    for k, sample in enumerate(dive(10.3)):
+        turning = replace(sample, rudder=0.002 * k)
+        windows[0].push(turning)
+        windows[1].push(replace(turning, rudder=math.nan) if k % 4 else turning)
+        if k % 4 == 0 and windows[1].is_full:
+            always, seldom = (window.compare(VEHICLE, np.array([0.0017, 0.01])) for window in windows)
+            assert seldom.errors == pytest.approx(always.errors, rel=1e-6)
+
+
 def model_file(path: Path, **changes: Any) -> Path:
     parameters = {name: {"value": value} for name, value in (asdict(VEHICLE) | changes).items()}
     path.write_text(json.dumps({"schema": 1, "parameters": parameters, "effects": []}))

@@ -40,6 +40,16 @@ def test_a_restart_of_the_vehicle_cuts_in_two(tmp_path: Path) -> None:
     assert {piece.notes for piece in pieces} == {()}
 
 
+def test_a_plane_that_turned_unheard_is_on_its_way(tmp_path: Path) -> None:
+    path = journal(tmp_path)
+    lines = path.read_text().splitlines(keepends=True)
+    lost = [f'"value":{0.01 * k},' for k in (40, 60, 61, 62)]
+    path.write_text("".join(x for x in lines if '"rudder"' not in x or not any(value in x for value in lost)))
+    (recording,) = read_recordings(path, default_vehicle())
+    assert len(lines) - len(path.read_text().splitlines()) == 4
+    assert recording.rudder == pytest.approx([0.01 * k for k in range(100)])
+
+
 @pytest.mark.parametrize(
     ("name", "says"),
     [("none.csv", "no such file"), (".", "is a folder"), ("empty.jsonl", "is empty")],
