@@ -34,9 +34,13 @@ def crosscovariance(first: Array, second: Array, lags: int) -> Array:
 
 
 def is_white(innovations: Array, lags: int = 20, significance: float = 0.001) -> bool:
-    """Box-Pierce test on each row of (outputs, N) innovations, each lag weighted by its number of pairs."""
+    """Box-Pierce test on each row of (outputs, N) innovations, each lag weighted by its number of pairs.
+
+    A row of few values, or that never changes, tells nothing against it.
+    """
     for values in innovations:
-        if np.isfinite(values).sum() < 3 * lags:
+        present = values[np.isfinite(values)]
+        if present.size < 3 * lags or np.ptp(present) == 0.0:
             continue
         covariance, pairs = autocovariance(values, lags)
         statistic = np.sum(pairs[1:] * (covariance[1:] / covariance[0]) ** 2)

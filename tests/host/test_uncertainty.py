@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from exact_dive import TABLE_1, Dive, fly
 from scipy.signal import lfilter
 
@@ -12,6 +13,13 @@ def test_white_noise_is_white_and_filtered_noise_is_not() -> None:
     white = rng.standard_normal((2, 2000))
     assert is_white(white)
     assert not is_white(np.asarray(lfilter([1.0], [1.0, -0.3], white)))
+
+
+@pytest.mark.parametrize("constant", [0.0, 0.1, np.nan])
+def test_what_never_changes_tells_nothing_against_whiteness(constant: float) -> None:
+    white = np.random.default_rng(5).normal(size=(1, 500))
+    assert is_white(np.vstack([white, np.full(500, constant)]))
+    assert not is_white(np.vstack([np.full(500, constant), np.cumsum(white)]))
 
 
 def test_gaps_do_not_colour_white_noise() -> None:
