@@ -20,7 +20,7 @@ EFFECTS = (
         slot="surge",
         parameters=(
             Parameter(
-                name="speed_time", unit="s", lower=0.3, upper=200, meaning="recovery time of the speed"
+                name="speed_time", unit="s", lower=0.3, upper=1000, meaning="recovery time of the speed"
             ),
             Parameter(name="c_ud", unit="m/s^2/rad^2", lower=-100, upper=500, meaning="drag of the plane"),
             Parameter(name="c_uq", unit="1", lower=-10, upper=20, meaning="heave and turning into surge"),
@@ -29,7 +29,7 @@ EFFECTS = (
         equation="u' = -(u^2 - u0^2)/(2 u0 speed_time) - c_ud (u/u0)^2 delta^2 - c_uq w q; "
         "a1, a2 ~ u; b1, b2 ~ u^2",
         manoeuvre="record the speed, or hold large plane angles for ten seconds and return to level",
-        probes=((5.0, 2.0, 1.0), (20.0, 1.0, 1.0)),
+        probes=((5.0, 0.0, 0.0), (30.0, 0.0, 0.0), (150.0, 0.0, 0.0)),
         force=_speed_loss,
         state="speed_loss",
         initial=lambda c: 0 * c.zeta,

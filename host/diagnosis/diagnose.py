@@ -208,6 +208,8 @@ def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfi
     size = max(after.chi2_depth, after.chi2_pitch) ** 0.5
     if left.is_smooth:
         kind = "it depends on the motion, so it is physics and no sea, but none that is known here"
+    elif left.is_no_sea:
+        kind = "it acts like noise, but too weakly for a sea: physics left out that comes and goes"
     elif left.is_coloured:
         kind = "it does not follow the motion: a disturbance with a rhythm or a drift of its own"
     else:

@@ -112,26 +112,25 @@ class Fitter:
         """Sensor noise of a fit over the noise floor, in the worse channel: 1 where nothing is left."""
         return float(np.max(fit.noise[:2] / self.floor))
 
-    def grown(
-        self, parent: Explanation, name: str, values: list[Array], least_gain: float
-    ) -> Explanation | None:
-        """The parent's set with one effect more, from the most promising of its start values.
+    def grown(self, parent: Explanation, name: str, values: list[Array]) -> Explanation:
+        """The parent's set with one effect more, from the two most promising of its start values.
 
-        values      start values of the effect's parameters from elsewhere, beside its own probes
-        least_gain  None is returned where the predicted gain is below
+        values  start values of the effect's parameters from elsewhere, beside its own probes
         """
         probed = sorted(self._probed(parent, named(name), values), key=lambda pair: -pair[0])
-        if probed[0][0] < least_gain:
-            return None
         names = parent.names | {name}
         starts = [self._point(names, parent, name, probe) for _, probe in probed[:2]]
         if self.excess(parent.fit) > FAR:
             starts = [starts[0], self._guess(starts[0], names)]
         return self._explained(names, self._fit(starts))
 
-    def gain(self, parent: Explanation, name: str, values: list[Array]) -> float:
-        """Twice the log-likelihood an effect could gain on top of the parent: one Gauss-Newton step ahead."""
-        return max(gain for gain, _ in self._probed(parent, named(name), values))
+    def gain(self, parent: Explanation, name: str, values: list[Array], is_thorough: bool) -> float:
+        """Twice the log-likelihood an effect could gain on top of the parent: one Gauss-Newton step ahead.
+
+        From `values` alone, or where these are none or it is to be thorough, from its own probes, too.
+        """
+        probed = self._probed(parent, named(name), values, is_thorough or not values)
+        return max(gain for gain, _ in probed)
 
     def shrunk(self, parent: Explanation, name: str) -> Explanation:
         """The parent's set without one of its effects."""
@@ -188,14 +187,16 @@ class Fitter:
     def _explained(self, names: Names, fit: Fit) -> Explanation:
         return Explanation(names, fit, self.bic(fit, names))
 
-    def _probed(self, parent: Explanation, effect: Effect, values: list[Array]) -> list[tuple[float, Array]]:
+    def _probed(
+        self, parent: Explanation, effect: Effect, values: list[Array], is_thorough: bool = True
+    ) -> list[tuple[float, Array]]:
         """Predicted gain and start values of an effect, for each of its probes."""
         names = parent.names | {effect.name}
         inputs, free = self.inputs(names), self.free(names)
         before = sum(float(np.nansum(e**2)) for e in parent.fit.whitened)
         has_sea = parent.fit.has_process_noise
         probed = []
-        for probe in values or self._probes(effect, parent):
+        for probe in [*values, *(self._probes(effect, parent) if is_thorough else [])]:
             point = self._point(names, parent, effect.name, probe)
             with np.errstate(over="ignore", invalid="ignore"):
                 white = (whitened_innovations if has_sea else residuals_at)(point, inputs)

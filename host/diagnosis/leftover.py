@@ -11,11 +11,13 @@ from scipy.stats import chi2
 from host.catalogue.nuisance import ANY_SMOOTH_FORCE
 from host.diagnosis.fitter import Explanation, Fitter
 from host.diagnosis.noise_floor import is_quantised
+from host.equations import NAMES
 from host.recording import Array, Recording
 from host.whiteness import is_white
 
 SIGNIFICANCE = 1e-4
 GROUPS = 10
+LEAST_SEA = 0.003  # m/s; below it physics left out, not moving water, is what passes for noise
 MOVEMENT_SPAN = 0.5  # s
 FLOOR_DOUBT = 1.3  # times the noise floor, which is itself estimated
 ROUNDING_DOUBT = 2.0  # the same where rounding rules: noise adds to it and is hidden by it
@@ -28,6 +30,7 @@ class Leftover:
 
     is_coloured     the innovations are not white, fast or slow
     is_local        they are larger in one range of the motion than in another, as those of no sea are
+    is_no_sea       the fit needs random forces, but they move the vehicle less than any sea would
     is_above_floor  the sensor noise of the fit exceeds what the sensors themselves show
     smooth_gain     twice the log-likelihood that any smooth force of the motion would gain
     is_smooth       whether that is more than chance gives
@@ -35,13 +38,15 @@ class Leftover:
 
     is_coloured: bool
     is_local: bool
+    is_no_sea: bool
     is_above_floor: bool
     smooth_gain: float
     is_smooth: bool
 
     @property
     def is_nothing(self) -> bool:
-        return not (self.is_coloured or self.is_local or self.is_above_floor or self.is_smooth)
+        signs = self.is_coloured, self.is_local, self.is_no_sea, self.is_above_floor, self.is_smooth
+        return not any(signs)
 
 
 def leftover(fitter: Fitter, best: Explanation) -> Leftover:
@@ -50,15 +55,22 @@ def leftover(fitter: Fitter, best: Explanation) -> Leftover:
     tested = ~rounded
     doubt = np.where(rounded, ROUNDING_DOUBT, FLOOR_DOUBT)
     innovations = [e[tested] for e in best.fit.whitened]
-    gain = fitter.gain(best, ANY_SMOOTH_FORCE.name, [])
+    gain = fitter.gain(best, ANY_SMOOTH_FORCE.name, [], is_thorough=True)
     terms = len(ANY_SMOOTH_FORCE.parameters)
     return Leftover(
         is_coloured=not all(is_white(e, significance=SIGNIFICANCE) and _is_even(e) for e in innovations),
         is_local=_is_local(fitter.recordings, innovations),
+        is_no_sea=best.fit.has_process_noise and _heave_by_sea(best) < LEAST_SEA,
         is_above_floor=bool((best.fit.noise[:2] > doubt * fitter.floor).any()),
         smooth_gain=gain,
         is_smooth=bool(gain > chi2.isf(SIGNIFICANCE, terms)),
     )
+
+
+def _heave_by_sea(best: Explanation) -> float:
+    """Rms heave velocity that the random force keeps up against the damping, m/s: sqrt(q / (2 |a1|))."""
+    a1 = best.fit.parameters[NAMES.index("a1")]
+    return float(np.sqrt(best.fit.noise[2] / (2.0 * abs(a1))))
 
 
 def _is_local(recordings: list[Recording], innovations: list[Array]) -> bool:

@@ -2,8 +2,8 @@
 
 Effects are never added one at a time for good: sets are carried side by side, every member of a set is
 re-estimated with the base whenever one joins, members that no longer pay are dropped, and each member of the
-best set is exchanged for every other effect that might do its work. What an effect could gain is predicted by
-one Gauss-Newton step from each of its probes; the promising ones are fitted.
+best set is exchanged for every other effect that might do its work. Each effect is fitted alone; what it
+could gain beside others is predicted by one Gauss-Newton step from there, and the promising ones are fitted.
 """
 
 from collections.abc import Callable
@@ -72,12 +72,14 @@ class Search:
         """The set less one member, as found while settling."""
         return self.tried[best.names - {name}]
 
-    def gains(self, parent: Explanation) -> dict[str, float]:
+    def gains(self, parent: Explanation, is_thorough: bool = True) -> dict[str, float]:
         """Twice the log-likelihood each effect could gain on top of the parent, predicted."""
         others = [effect.name for effect in CATALOGUE if effect.name not in parent.names]
         if FREE_TRIM.name in parent.names:
             others = [name for name in others if name not in OFFSETS]
-        found = self.workers.results([("gain", (parent, name, self._values(name))) for name in others])
+        found = self.workers.results(
+            [("gain", (parent, name, self._values(name), is_thorough)) for name in others]
+        )
         return dict(zip(others, found, strict=True))
 
     def _parents(self, grown: list[Explanation]) -> list[Explanation]:
@@ -89,18 +91,17 @@ class Search:
     def _grown(self, parents: list[Explanation], size: int) -> list[Explanation]:
         tasks: dict[Names, Task] = {}
         for parent in parents:
-            for name in self._promising(parent, size):
-                least = -float("inf") if BY_NAME[name].is_common or size > 1 else NAMING_MARGIN
-                tasks.setdefault(parent.names | {name}, ("grown", (parent, name, self._values(name), least)))
+            for name in self._promising(parent, size, parent is parents[0]):
+                tasks.setdefault(parent.names | {name}, ("grown", (parent, name, self._values(name))))
         labels = [" + ".join(sorted(names)) for names in tasks]
 
         def say(number: int) -> None:
             self.on_progress(f"{size} effect{'s' * (size > 1)}, {number + 1}/{len(labels)}: {labels[number]}")
 
         found = self.workers.results(list(tasks.values()), say)
-        return [self._remember(explanation) for explanation in found if explanation is not None]
+        return [self._remember(explanation) for explanation in found]
 
-    def _promising(self, parent: Explanation, size: int) -> list[str]:
+    def _promising(self, parent: Explanation, size: int, is_leading: bool) -> list[str]:
         """Effects to fit in earnest: all at first, later those predicted to gain most.
 
         The prediction is local. A base bent far from the truth hides what the common effects, which trade
@@ -112,7 +113,7 @@ class Search:
             others = [name for name in others if name not in OFFSETS]
         if size == 1:
             return others
-        gains = self.gains(parent)
+        gains = self.gains(parent, is_leading)
         best = sorted(gains, key=lambda name: -gains[name])[:PROMISING]
         worth = {name for name in best if gains[name] > NAMING_MARGIN}
         is_far = self.fitter.excess(parent.fit) > NEAR
@@ -168,17 +169,25 @@ class Search:
         """The best set with one member exchanged for another, where that is better still."""
         tasks: dict[Names, Task] = {}
         for smaller in fewer:
+            (member,) = best.names - smaller.names
             gains = self.gains(smaller)
             worth = smaller.bic - best.bic
-            rivals = [name for name in gains if name not in best.names and gains[name] > 0.5 * worth]
-            for name in sorted(rivals, key=lambda name: -gains[name])[:RIVALS]:
-                least = -float("inf")
-                tasks[smaller.names | {name}] = ("grown", (smaller, name, self._values(name), least))
+            likely = [name for name in gains if gains[name] > 0.5 * worth]
+            rivals = set(sorted(likely, key=lambda name: -gains[name])[:RIVALS])
+            rivals |= {name for name in gains if self._is_kin(name, member)}
+            for name in sorted(rivals - best.names):
+                tasks[smaller.names | {name}] = ("grown", (smaller, name, self._values(name)))
         grown = [self._remember(e) for e in self.workers.results(list(tasks.values()))]
         close = [e for e in grown if e.bic < best.bic + 4.0 * TWIN_MARGIN]
         close = [self._remember(e) for e in self.workers.results([("polished", (e,)) for e in close])]
         rival = min(close, key=lambda e: e.bic, default=best)
         return rival if rival.bic < best.bic - 0.01 else None
+
+    def _is_kin(self, name: str, member: str) -> bool:
+        """Of the same slot and of some use alone: an effect whose gain a prediction may misjudge."""
+        alone = self.tried.get(self.root.names | {name})
+        pays = alone is not None and alone.bic < self.root.bic - NAMING_MARGIN
+        return pays and name != member and BY_NAME[name].slot == BY_NAME[member].slot
 
     def _remember(self, explanation: Explanation) -> Explanation:
         known = self.tried.get(explanation.names)

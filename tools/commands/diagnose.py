@@ -1,6 +1,8 @@
 """`mils diagnose`: where simulation and recording differ, what physics was left out, and proof."""
 
 import argparse
+import os
+import sys
 from pathlib import Path
 
 from tools.bench import load_vehicle, progress, read_all
@@ -18,11 +20,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="where diagnosis.json, extended_model.json and report.html go",
     )
+    parser.add_argument("--jobs", type=int, metavar="N", help="fits at once (default: all cores, at most 8)")
     parser.add_argument("--quiet", action="store_true", help="no progress")
 
 
 def run(args: argparse.Namespace) -> int:
     """0 when the answer is known (nothing missing, or explained); 1 when it is not, or only in part."""
+    if args.jobs is not None and args.jobs < 1:
+        print("mils: --jobs must be at least 1", file=sys.stderr)
+        return 2
+    jobs = args.jobs if args.jobs is not None else min(8, len(os.sched_getaffinity(0)))
     vehicle = load_vehicle(args.vehicle)
     with progress(args.quiet) as say:
         recordings = read_all(args.recordings, vehicle, say)
@@ -30,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
         from host.diagnosis.files import write_diagnosis, write_extended_model
         from host.diagnosis.report import summary, title, write_report
 
-        found = diagnose(recordings, say)
+        found = diagnose(recordings, say, jobs)
         args.out.mkdir(parents=True, exist_ok=True)
         write_diagnosis(found, args.out / "diagnosis.json")
         write_extended_model(found, vehicle, args.out / "extended_model.json")

@@ -45,7 +45,7 @@ def diagnose_all(
 ) -> dict[str, Run]:
     """The runs by name of recording; those that have answered before are kept and not repeated.
 
-    command    in place of `mils diagnose`; RECORDING --out DIR --quiet is added
+    command    in place of `mils diagnose`; RECORDING --out DIR --jobs 1 --quiet is added
     """
     runs = {}
     with ThreadPoolExecutor(jobs) as pool:
@@ -107,7 +107,7 @@ def _diagnose(recording: Path, out: Path, command: tuple[str, ...]) -> Run:
     began = time.monotonic()
     with spoken.open("w", encoding="utf-8") as voice:
         process = subprocess.Popen(
-            [*command, str(recording), "--out", str(out), "--quiet"],
+            [*command, str(recording), "--out", str(out), "--jobs", "1", "--quiet"],
             stdout=voice,
             stderr=subprocess.STDOUT,
             env=_environment(),
