@@ -106,11 +106,17 @@ class _Channel:
         # Rounding must not leave the interval between the neighbours.
         return min(max(before + share * (after - before), min(before, after)), max(before, after))
 
-    def held(self, t_us: int, hold_us: int, near_us: int) -> float:
-        last = bisect_right(self.times, t_us + near_us) - 1
-        if last < 0 or t_us - self.times[last] > hold_us:
+    def held_mean(self, t_us: int, until_us: int, hold_us: int, near_us: int) -> float:
+        """Mean from `t_us` to `until_us` of values that each hold until the next one."""
+        first = bisect_right(self.times, t_us + near_us) - 1
+        if first < 0 or t_us - self.times[first] > hold_us:
             return nan
-        return self.values[last]
+        last = bisect_right(self.times, until_us - near_us)
+        mean, end_us = self.values[first], until_us
+        for k in range(last - 1, first, -1):
+            mean += (self.values[k] - self.values[first]) * (end_us - self.times[k]) / (until_us - t_us)
+            end_us = self.times[k]
+        return mean
 
     @property
     def _usual_interval(self) -> float:
@@ -121,32 +127,38 @@ class _Channel:
         whole = [interval for interval in self._intervals if interval <= _LOST_ONE * short]
         return sum(whole) / len(whole)
 
-    def has_lost_change(self, t_us: int, known_to_us: int, near_us: int) -> bool:
-        """Whether a measurement that could have told of a change by `t_us` was lost.
+    def has_lost_change(self, t_us: int, until_us: int, known_to_us: int, near_us: int) -> bool:
+        """Whether from `t_us` to `until_us` the value may have changed unheard.
 
-        The last value holds until the next one is due. Beyond that it holds if the next one was not lost, or
-        says the same. What came after `known_to_us` is not looked at.
+        A value holds until the next one is due. Beyond that it holds if the next one was not lost, or says
+        the same. What came after `known_to_us` is not looked at.
         """
-        following = bisect_right(self.times, t_us + near_us)
-        if following == 0:
-            return False
-        since, usual = self.times[following - 1], self._usual_interval
-        if t_us + near_us < since + usual:
-            return False
-        if following == len(self.times) or self.times[following] > known_to_us:
-            return known_to_us - since > _LOST_ONE * usual
-        is_same = self.values[following] == self.values[following - 1]
-        return self.times[following] - since > _LOST_ONE * usual and not is_same
+        first = max(0, bisect_right(self.times, t_us + near_us) - 1)
+        last = bisect_right(self.times, until_us - near_us)
+        usual = self._usual_interval
+        for k in range(first, last):
+            if self.times[k] + usual >= until_us - near_us:
+                continue
+            is_heard = k + 1 < len(self.times) and self.times[k + 1] <= known_to_us
+            next_us = self.times[k + 1] if is_heard else known_to_us
+            is_same = is_heard and self.values[k + 1] == self.values[k]
+            if next_us - self.times[k] > _LOST_ONE * usual and not is_same:
+                return True
+        return False
 
 
 class Aligner:
     """Turns measurements, pushed in the order in which they came, into samples at whole steps.
 
     Depth, pitch, speed and pitch rate at an instant are the measurement itself or the straight line between
-    its two neighbours; nothing is extrapolated. The rudder is a command that the actuator holds; where a
-    message was lost and the next one differs, it is unknown from when the lost one was due. An instant is
-    complete when every channel has passed it, or when one is `latency` beyond it. The grid starts at the
-    first pitch measurement, the signal that interpolation would harm most.
+    its two neighbours; nothing is extrapolated. The rudder is a command that the actuator holds. That of a
+    sample is its mean over the step that follows: a plane that turns between two instants does so neither
+    early nor late. Where a message was lost and the next one differs, it is unknown from when the lost one
+    was due.
+
+    An instant is complete when every channel has passed it, and the rudder the next one, or when one is
+    `latency` beyond it. The grid starts at the first pitch measurement, the signal that interpolation would
+    harm most.
 
     The result does not depend on how channels interleave as long as they lag one another by less than
     latency - max_gap.
@@ -252,10 +264,11 @@ class Aligner:
         assert self._newest is not None
         if self._newest >= t_us + self._latency_us:
             return True
-        in_use = (
-            channel for quantity, channel in self._channels.items() if quantity in _NEEDED or channel.times
+        return all(
+            channel.times and channel.times[-1] >= (t_us + self._step_us if quantity is _HELD else t_us)
+            for quantity, channel in self._channels.items()
+            if quantity in _NEEDED or channel.times
         )
-        return all(channel.times and channel.times[-1] >= t_us for channel in in_use)
 
     def _emit(self, t_us: int) -> Sample:
         at: dict[Quantity, float] = {}
@@ -278,8 +291,9 @@ class Aligner:
 
     def _held(self, channel: _Channel, t_us: int) -> float:
         assert self._newest is not None
+        until_us = t_us + self._step_us
         # Further on, how much has come depends on how the channels interleave.
         known_to_us = min(self._newest, t_us + self._max_gap_us)
-        if not self._rudder_on_change and channel.has_lost_change(t_us, known_to_us, self._near_us):
+        if not self._rudder_on_change and channel.has_lost_change(t_us, until_us, known_to_us, self._near_us):
             return nan
-        return channel.held(t_us, self._hold_us, self._near_us)
+        return channel.held_mean(t_us, until_us, self._hold_us, self._near_us)
