@@ -32,8 +32,8 @@ class Parameter:
 
 
 PARAMETERS = (
-    Parameter(name="a1", unit="1/s", lower=-40.0, upper=-1e-4, meaning="heave damping"),
-    Parameter(name="a2", unit="1/s", lower=-45.0, upper=-1e-4, meaning="pitch damping"),
+    Parameter(name="a1", unit="1/s", lower=-25.0, upper=-1e-4, meaning="heave damping"),
+    Parameter(name="a2", unit="1/s", lower=-25.0, upper=-1e-4, meaning="pitch damping"),
     Parameter(name="a3", unit="1/s^2", lower=-1000.0, upper=5.0, meaning="pitch restoring"),
     Parameter(name="b1", unit="m/s^2/rad", lower=-100.0, upper=100.0, meaning="plane force in heave"),
     Parameter(name="b2", unit="1/s^2", lower=-1000.0, upper=1000.0, meaning="plane moment in pitch"),

@@ -94,6 +94,8 @@ class GaussNewton:
             rhs -= Hpx @ np.linalg.solve(Hxx, gx)
         scale = np.sqrt(np.maximum(np.diag(self.H), 1e-300))
         normal = reduced / np.outer(scale, scale) + damping * np.eye(scale.size)
+        if not np.isfinite(normal).all():
+            return self.point  # the model has run away: no step is better than none
         try:
             delta = cho_solve(cho_factor(normal), rhs / scale) / scale
         except np.linalg.LinAlgError:

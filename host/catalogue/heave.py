@@ -64,6 +64,7 @@ EFFECTS = (
         manoeuvre="a start from rest with the planes level, or a change of speed",
         probes=((0.0,),),
         force=_buoyancy,
+        is_common=True,
     ),
     Effect(
         name="depth_dependent_buoyancy",

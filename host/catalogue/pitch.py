@@ -42,6 +42,7 @@ EFFECTS = (
         manoeuvre="straight runs with the planes level at two speeds",
         probes=((0.0,),),
         force=_trim,
+        is_common=True,
     ),
     Effect(
         name="munk_moment",

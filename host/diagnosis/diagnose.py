@@ -17,10 +17,14 @@ from host.diagnosis.spans import divide
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.workers import Workers
 from host.equations import NAMES, Slot
+from host.fit import Fit
 from host.recording import Array, Recording
 from host.uncertainty import covariance
+from host.wave_forces import wave_forces
 
 Verdict = Literal["no_mismatch", "explained", "partly_explained", "unexplained"]
+WAVES = "surface_waves"
+WAVE_PERIODS = (2.0, 20.0)  # s
 SLOTS: tuple[Slot, ...] = ("heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment")
 
 
@@ -76,7 +80,8 @@ def diagnose(
         left = leftover(fitter, best)
         if not left.is_nothing:
             search, best = _in_a_sea(search, best)
-            left = leftover(fitter, best)
+            best, rough = _among_waves(search, best)
+            left = leftover(fitter, best, rough)
         on_progress("held-out check")
         judging = spans.judging or spans.teaching
         before, after = misfit(search.base, judging, floor), misfit(best, judging, floor)
@@ -126,6 +131,22 @@ def _in_a_sea(calm: Search, best: Explanation) -> tuple[Search, Explanation]:
     rough = Search(fitter, calm.workers, calm.on_progress, fitter.with_sea(calm.base), root)
     found = rough.run([also])
     return (rough, found) if found.bic < best.bic else (calm, best)
+
+
+def _among_waves(search: Search, best: Explanation) -> tuple[Explanation, Fit | None]:
+    """Names surface waves where random forces that swing with a wave's period beat white ones; and their fit.
+
+    The evidence is that of the swing; what the model gets is the regular wave nearest to it.
+    """
+    if not best.fit.has_process_noise or WAVES in best.names:
+        return best, None
+    search.on_progress("waves")
+    rough = wave_forces(best.fit, search.fitter.inputs(best.names))
+    bic, period = search.fitter.bic(rough, best.names), 2.0 * np.pi / rough.waves[0]
+    if bic > best.bic - NAMING_MARGIN or not WAVE_PERIODS[0] < period < WAVE_PERIODS[1]:
+        return best, None
+    regular = search.fitter.grown(best, WAVES, [np.array([0.01, 0.01, period])])
+    return Explanation(regular.names, regular.fit, min(regular.bic, bic)), rough
 
 
 def _named(

@@ -22,7 +22,7 @@ HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is
 RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exact twins
 FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
 # Enough to rank sets; those that count are polished.
-FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 3, 12, 0.5
+FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 12, 0.2
 PERIODS_TRIED = 3
 
 
@@ -76,8 +76,13 @@ class Fitter:
         values = fit.parameters.copy()
         trim = [NAMES.index(name) for name in HELD]
         offsets, values[trim] = values[trim], 0.0
-        start = Point(structure_of(names), np.concatenate([values, offsets]), fit.initial, fit.noise)
-        return self._explained(names, output_error(start, self.inputs(names), self.free(names)))
+        structure, base = structure_of(names), self.base.fit
+        starts = [
+            Point(structure, np.concatenate([values, offsets]), fit.initial, fit.noise),
+            Point(structure, np.concatenate([base.parameters, np.zeros(2)]), base.initial, base.noise),
+        ]
+        best = max(map(self._carried_on, starts), key=lambda fit: fit.log_likelihood)
+        return self._explained(names, best)
 
     def retrimmed(self, explanation: Explanation, offsets: Names) -> Explanation:
         """The same set with some of the catalogue's offsets in place of the free trim."""
@@ -265,7 +270,7 @@ class Fitter:
         fits = [output_error(start, inputs, free, FIRST_ITERATIONS, TOLERANCE) for start in starts]
         best = max(fits, key=lambda fit: fit.log_likelihood)
         on = Point(structure, best.parameters, best.initial, best.noise)
-        return best if best.converged else output_error(on, inputs, free, MOST_ITERATIONS, TOLERANCE)
+        return output_error(on, inputs, free, MOST_ITERATIONS, TOLERANCE)
 
     def _carried_on(self, start: Point) -> Fit:
         names = frozenset(effect.name for effect in start.structure.effects)

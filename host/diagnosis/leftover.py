@@ -12,6 +12,7 @@ from host.catalogue.nuisance import ANY_SMOOTH_FORCE
 from host.diagnosis.fitter import Explanation, Fitter
 from host.diagnosis.noise_floor import is_quantised
 from host.equations import NAMES
+from host.fit import Fit
 from host.recording import Array, Recording
 from host.whiteness import is_white
 
@@ -49,32 +50,36 @@ class Leftover:
         return not any(signs)
 
 
-def leftover(fitter: Fitter, best: Explanation) -> Leftover:
-    """Tests the innovations of an explanation, but for quantised channels: rounding is no white noise."""
+def leftover(fitter: Fitter, best: Explanation, among_waves: Fit | None = None) -> Leftover:
+    """Tests the innovations of an explanation, but for quantised channels: rounding is no white noise.
+
+    among_waves  the fit whose innovations count where waves act
+    """
+    fit = best.fit if among_waves is None else among_waves
     rounded = is_quantised(fitter.recordings)
     tested = ~rounded
     doubt = np.where(rounded, ROUNDING_DOUBT, FLOOR_DOUBT)
-    innovations = [e[tested] for e in best.fit.whitened]
+    innovations = [e[tested] for e in fit.whitened]
     gain = fitter.gain(best, ANY_SMOOTH_FORCE.name, [], is_thorough=True)
     terms = len(ANY_SMOOTH_FORCE.parameters)
     return Leftover(
         is_coloured=not all(is_white(e, significance=SIGNIFICANCE) and _is_even(e) for e in innovations),
         is_local=_is_local(fitter.recordings, innovations),
-        is_no_sea=best.fit.has_process_noise and _heave_by_sea(best) < LEAST_SEA,
-        is_above_floor=bool((best.fit.noise[:2] > doubt * fitter.floor).any()),
+        is_no_sea=among_waves is None and fit.has_process_noise and _heave_by_sea(fit) < LEAST_SEA,
+        is_above_floor=bool((fit.noise[:2] > doubt * fitter.floor).any()),
         smooth_gain=gain,
         is_smooth=bool(gain > chi2.isf(SIGNIFICANCE, terms)),
     )
 
 
-def _heave_by_sea(best: Explanation) -> float:
+def _heave_by_sea(fit: Fit) -> float:
     """Rms heave velocity that the random force keeps up against the damping, m/s: sqrt(q / (2 |a1|))."""
-    a1 = best.fit.parameters[NAMES.index("a1")]
-    return float(np.sqrt(best.fit.noise[2] / (2.0 * abs(a1))))
+    a1 = fit.parameters[NAMES.index("a1")]
+    return float(np.sqrt(fit.noise[2] / (2.0 * abs(a1))))
 
 
 def _is_local(recordings: list[Recording], innovations: list[Array]) -> bool:
-    """Whether the squared innovations differ between tenths of plane angle, plane movement or pitch.
+    """Whether the squared innovations differ between tenths of plane angle or plane movement.
 
     The means of ten groups of n white squares scatter by the kurtosis over n; their chi2 has 9 degrees.
     """
@@ -82,11 +87,8 @@ def _is_local(recordings: list[Recording], innovations: list[Array]) -> bool:
         warnings.simplefilter("ignore", RuntimeWarning)  # rows without any measurement
         squares = np.concatenate([np.nanmean(np.atleast_2d(e**2), axis=0) for e in innovations])
     moved = [np.abs(np.gradient(gaussian_filter1d(r.rudder, MOVEMENT_SPAN / r.step))) for r in recordings]
-    for quantity in (
-        np.concatenate([r.rudder for r in recordings]),
-        np.concatenate(moved),
-        np.concatenate([_filled(r.pitch) for r in recordings]),
-    ):
+    # Not by pitch: a group of measured angles is one of errors, too.
+    for quantity in (np.concatenate([r.rudder for r in recordings]), np.concatenate(moved)):
         known = np.isfinite(squares)
         values = squares[known]
         groups = np.array_split(np.argsort(quantity[known], kind="stable"), GROUPS)
@@ -95,11 +97,6 @@ def _is_local(recordings: list[Recording], innovations: list[Array]) -> bool:
         if np.sum((means - values.mean()) ** 2 / scatter) > chi2.isf(SIGNIFICANCE, GROUPS - 1):
             return True
     return False
-
-
-def _filled(values: Array) -> Array:
-    known = np.flatnonzero(np.isfinite(values))
-    return np.asarray(np.interp(np.arange(values.size), known, values[known]))
 
 
 def _is_even(innovations: Array) -> bool:

@@ -23,6 +23,7 @@ BEAM = 4  # sets carried on
 FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
 PROMISING = 6
 RIVALS = 5
+ROUGH = 60.0  # of BIC, that a fit of the search may gain by polishing
 LARGEST_SET = 5
 NEAR = 1.15  # times the noise floor: little is left, and gains are well predicted
 MOST_ROUNDS = 6
@@ -69,7 +70,9 @@ class Search:
         return sorted(close, key=lambda other: close[other])[: LARGEST_CLASS - 1]
 
     def without(self, best: Explanation, name: str) -> Explanation:
-        """The set less one member, as found while settling."""
+        """The set less one member."""
+        if best.names - {name} not in self.tried:
+            self._remember(self.fitter.shrunk(best, name))
         return self.tried[best.names - {name}]
 
     def gains(self, parent: Explanation, is_thorough: bool = True) -> dict[str, float]:
@@ -111,12 +114,12 @@ class Search:
         others = [effect.name for effect in CATALOGUE if effect.name not in parent.names]
         if FREE_TRIM.name in parent.names:
             others = [name for name in others if name not in OFFSETS]
-        if size == 1:
+        if size == 1 and not self.root.fit.has_process_noise:
             return others
         gains = self.gains(parent, is_leading)
         best = sorted(gains, key=lambda name: -gains[name])[:PROMISING]
         worth = {name for name in best if gains[name] > NAMING_MARGIN}
-        is_far = self.fitter.excess(parent.fit) > NEAR
+        is_far = self.fitter.excess(parent.fit) > NEAR and not self.root.fit.has_process_noise
         return [name for name in others if name in worth or (is_far and BY_NAME[name].is_common)]
 
     def _values(self, name: str) -> list[Array]:
@@ -151,10 +154,12 @@ class Search:
 
     def _retrimmed(self) -> Explanation:
         """The leading sets with the free trim explained by as few of the offsets as will do."""
-        free = sorted((e for e in self.tried.values() if FREE_TRIM.name in e.names), key=lambda e: e.bic)
-        free = [e for e in free[:BEAM] if e.bic < free[0].bic + 2.0 * NAMING_MARGIN]
-        polished = [self._remember(e) for e in self.workers.results([("polished", (e,)) for e in free])]
+        free = [e for e in self.tried.values() if FREE_TRIM.name in e.names]
+        free = sorted((e for e in free if not self._has_idle_member(e)), key=lambda e: e.bic)
+        rough = [e for e in free[: 2 * BEAM] if e.bic < free[0].bic + ROUGH]
+        polished = [self._remember(e) for e in self.workers.results([("polished", (e,)) for e in rough])]
         leading = min(polished, key=lambda e: e.bic)
+        polished = [e for e in polished if e.bic < leading.bic + 2.0 * NAMING_MARGIN]
         explained = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
         for counts in ((0, 1), (2,)):
             ways = [frozenset(way) for count in counts for way in combinations(OFFSETS, count)]
@@ -164,6 +169,13 @@ class Search:
             if best.bic < leading.bic + NAMING_MARGIN:
                 break
         return best
+
+    def _has_idle_member(self, explanation: Explanation) -> bool:
+        """Whether a smaller set does as well."""
+        return any(
+            self.root.names <= names < explanation.names and smaller.bic < explanation.bic + NAMING_MARGIN
+            for names, smaller in self.tried.items()
+        )
 
     def _exchanged(self, best: Explanation, fewer: list[Explanation]) -> Explanation | None:
         """The best set with one member exchanged for another, where that is better still."""
@@ -184,10 +196,11 @@ class Search:
         return rival if rival.bic < best.bic - 0.01 else None
 
     def _is_kin(self, name: str, member: str) -> bool:
-        """Of the same slot and of some use alone: an effect whose gain a prediction may misjudge."""
+        """Of the same end of the chain and of some use alone: its gain may be misjudged by prediction."""
         alone = self.tried.get(self.root.names | {name})
         pays = alone is not None and alone.bic < self.root.bic - NAMING_MARGIN
-        return pays and name != member and BY_NAME[name].slot == BY_NAME[member].slot
+        slots = {BY_NAME[name].slot, BY_NAME[member].slot}
+        return pays and name != member and (len(slots) == 1 or slots == {"actuator", "sensor"})
 
     def _remember(self, explanation: Explanation) -> Explanation:
         known = self.tried.get(explanation.names)
