@@ -25,6 +25,6 @@ def smoothed_speed(measured: Array) -> Array:
         return float((rows - 1) * np.log(np.mean(power / shape)) + np.sum(np.log(shape)))
 
     # From hardly any noise to hardly any change over the whole recording.
-    found = minimize_scalar(cost, bounds=(-7.0, 2.0 * np.log(rows) + 7.0), method="bounded")
+    found = minimize_scalar(cost, bounds=(-25.0, 2.0 * np.log(rows) + 7.0), method="bounded")
     kept = 1.0 / (1.0 + np.exp(found.x) * stiffness)
     return np.asarray(idct(np.concatenate([transform[:1], kept * transform[1:]]), norm="ortho"))

@@ -39,29 +39,31 @@ def heldout_errors(path: Path, names: tuple[str, ...], start: dict[str, float]) 
     recordings = read_all([path], load_vehicle(None), lambda _: None)
     import numpy as np
 
-    from host.catalogue import BY_NAME
+    from host.catalogue import OFFSETS
+    from host.diagnosis.fitter import Explanation, Fitter
     from host.diagnosis.noise_floor import noise_floor
     from host.diagnosis.scoring import misfit
-    from host.diagnosis.search import Explanation, Search
     from host.diagnosis.spans import divide
     from host.gauss_newton import Point
     from host.maximum_likelihood import output_error
-    from host.propagate import inputs_of
 
     spans = divide(recordings)
-    search = Search(spans.teaching)
-    for order in permutations(names):
-        grown = search.base
+    fitter = Fitter(spans.teaching)
+    told = frozenset(names)
+    offsets = told & frozenset(OFFSETS)
+    candidates = []
+    for order in permutations(told - offsets):
+        grown = fitter.trimmed()
         for name in order:
-            grown = search.extended(grown, BY_NAME[name])
-    best = search.polished(search.tried[frozenset(names)])
+            grown = fitter.grown(grown, name, [])
+        candidates.append(fitter.retrimmed(fitter.polished(grown), offsets))
+    best = min(candidates, key=lambda e: e.bic)
     fit = best.fit
-    told = [start.get(name, value) for name, value in zip(fit.structure.names, fit.parameters, strict=True)]
-    point = Point(fit.structure, np.where(fit.free, told, fit.parameters), fit.initial, fit.noise)
-    inputs = [inputs_of(recording, fit.structure) for recording in spans.teaching]
-    again = output_error(point, inputs, fit.free)
+    values = [start.get(name, value) for name, value in zip(fit.structure.names, fit.parameters, strict=True)]
+    point = Point(fit.structure, np.where(fit.free, values, fit.parameters), fit.initial, fit.noise)
+    again = output_error(point, fitter.inputs(told), fit.free)
     if again.log_likelihood > fit.log_likelihood:
-        best = Explanation(best.names, again, best.bic)
+        best = Explanation(told, again, fitter.bic(again, told))
     return misfit(best, spans.judging or spans.teaching, noise_floor(recordings)).as_json()
 
 
