@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from host.catalogue import BY_NAME
+from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import Diagnosis
 from host.diagnosis.fitter import Explanation
 from host.diagnosis.scoring import Misfit
@@ -17,13 +18,14 @@ from host.vehicle import Vehicle
 SCHEMA = 1
 
 
-def write_diagnosis(found: Diagnosis, path: Path) -> None:
+def write_diagnosis(answer: Answer, path: Path) -> None:
     """Writes diagnosis.json; figures that do not exist are null."""
-    path.write_text(json.dumps(_finite(document(found)), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    path.write_text(json.dumps(_finite(document(answer)), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def document(found: Diagnosis) -> dict[str, Any]:
-    """The diagnosis as plain values, by the names of the file format."""
+def document(answer: Answer) -> dict[str, Any]:
+    """The answer as plain values, by the names of the file format."""
+    found, against = answer.found, answer.against
     location = found.location
     return {
         "schema": SCHEMA,
@@ -63,7 +65,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
         },
         "ranking": [{"name": name, "delta_bic": gain} for name, gain in found.ranking],
         "is_held_out": found.is_held_out,
-    }
+    } | ({against.kind: against.as_json()} if against is not None else {})
 
 
 def _side(explanation: Explanation, misfit: Misfit) -> dict[str, Any]:
@@ -87,11 +89,11 @@ def write_extended_model(found: Diagnosis, vehicle: Vehicle, path: Path) -> None
         {
             "name": effect.name,
             "parameters": {
-                name: {"value": value, "std": std, "unit": unit}
-                for name, (value, std, unit) in effect.coefficients.items()
+                p.name: {"value": values[p.name], "std": found.std[p.name], "unit": p.unit}
+                for p in effect.parameters
             },
         }
-        for effect in found.effects
+        for effect in fit.structure.effects
     ]
     model = model_of(
         found.recordings,

@@ -8,6 +8,7 @@ from jinja2 import Environment, FileSystemLoader, select_autoescape
 from matplotlib import pyplot as plt
 
 from host.catalogue import BY_NAME
+from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import Diagnosis, NamedEffect
 from host.diagnosis.first_guess import smoothed_motion
 from host.diagnosis.scoring import Misfit, free_run_errors
@@ -17,8 +18,9 @@ from host.version import program_version
 BASE_COLOUR = "#dd8452"
 
 
-def write_report(found: Diagnosis, vehicle: str, path: Path) -> None:
+def write_report(answer: Answer, vehicle: str, path: Path) -> None:
     """Writes report.html."""
+    found = answer.found
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent), autoescape=select_autoescape(["j2", "html"])
     )
@@ -29,7 +31,7 @@ def write_report(found: Diagnosis, vehicle: str, path: Path) -> None:
         duration=sum(recording.duration for recording in found.recordings),
         version=program_version(),
         verdict=found.verdict,
-        summary=summary(found),
+        summary=summary(answer),
         effects=[_effect(effect) for effect in found.effects],
         held_out=found.is_held_out,
         proof=_proof(found),
@@ -48,10 +50,14 @@ def title(name: str) -> str:
     return name.replace("_", " ")
 
 
-def summary(found: Diagnosis) -> str:
+def summary(answer: Answer) -> str:
     """The answer in a sentence or two."""
+    found, against = answer.found, answer.against
+    base = "given model" if against is not None and against.kind == "model" else "base equations"
     if found.verdict == "no_mismatch":
-        return "Nothing is missing: the base equations reproduce this recording down to the sensors' noise."
+        return f"Nothing is missing: the {base} can reproduce this recording down to the sensors' noise."
+    if not found.effects and found.verdict == "explained":
+        return "The given model lacks no physics, but what it holds is not what the recording shows."
     if not found.effects:
         return "Simulation and recording differ, and none of the physics in the catalogue explains it."
     names = [title(effect.name) for effect in found.effects]

@@ -5,12 +5,18 @@ import os
 import sys
 from pathlib import Path
 
-from tools.bench import load_vehicle, progress, read_all
+from tools.bench import load_vehicle, progress, read_all, require_bench
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "recordings", metavar="RECORDING", nargs="+", type=Path, help=".csv .tlog .BIN .log .asc .blf .jsonl"
+    )
+    parser.add_argument(
+        "--model",
+        type=Path,
+        metavar="M.json",
+        help="set this model, as it is, against the recording, in place of a base fitted to it",
     )
     parser.add_argument("--vehicle", type=Path, help="vehicle file: columns, units, channels, speed")
     parser.add_argument(
@@ -31,19 +37,31 @@ def run(args: argparse.Namespace) -> int:
         return 2
     jobs = args.jobs if args.jobs is not None else min(8, len(os.sched_getaffinity(0)))
     vehicle = load_vehicle(args.vehicle)
+    require_bench()
+    from host.model import read_model
+
+    model = read_model(args.model) if args.model is not None else None
     with progress(args.quiet) as say:
         recordings = read_all(args.recordings, vehicle, say)
+        from host.diagnosis.answer import Answer
         from host.diagnosis.diagnose import diagnose
         from host.diagnosis.files import write_diagnosis, write_extended_model
+        from host.diagnosis.given_model import against_model
         from host.diagnosis.report import summary, title, write_report
 
-        found = diagnose(recordings, say, jobs)
+        answer = Answer(found=diagnose(recordings, say, jobs))
+        if model is not None:
+            say("against the model")
+            answer = against_model(answer.found, model, args.model.name)
+        found = answer.found
         args.out.mkdir(parents=True, exist_ok=True)
-        write_diagnosis(found, args.out / "diagnosis.json")
+        write_diagnosis(answer, args.out / "diagnosis.json")
         write_extended_model(found, vehicle, args.out / "extended_model.json")
         say("writing the report")
-        write_report(found, vehicle.name, args.out / "report.html")
-    print(f"{found.verdict}: {summary(found)}")
+        write_report(answer, vehicle.name, args.out / "report.html")
+    print(f"{found.verdict}: {summary(answer)}")
+    for sentence in answer.against.sentences if answer.against is not None else []:
+        print(f"  {sentence}")
     for effect in found.effects:
         twins = f"  (or {', '.join(map(title, effect.twins))})" if effect.twins else ""
         print(f"  {effect.name}{twins}")

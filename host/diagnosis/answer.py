@@ -1,0 +1,40 @@
+"""All that `mils diagnose` tells: the diagnosis, and what a model or a simulation lacks beside it."""
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from host.diagnosis.comparison import Comparison, as_json, sentences
+from host.diagnosis.diagnose import Diagnosis
+from host.recording import Recording
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Against:
+    """What was set against the recording.
+
+    details    more for diagnosis.json
+    recorded   a simulation's own run, for the pictures; empty for a model
+    """
+
+    kind: Literal["model", "simulation"]
+    name: str
+    comparison: Comparison
+    details: dict[str, Any] = field(default_factory=dict)
+    recorded: list[Recording] = field(default_factory=list)
+
+    @property
+    def sentences(self) -> list[str]:
+        """What differs, in words."""
+        return sentences(self.comparison, self.kind)
+
+    def as_json(self) -> dict[str, Any]:
+        """The key "model" or "simulation" of diagnosis.json."""
+        return {"file": self.name, **self.details, **as_json(self.comparison, self.kind)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """The diagnosis and what belongs to it; without `against` the base was fitted to the recording."""
+
+    found: Diagnosis
+    against: Against | None = None

@@ -1,0 +1,234 @@
+"""Another side's physics (a model, a simulator) against what a recording shows, effect by effect.
+
+Twins would make the two look different where they agree, so the recording is first told in the other side's
+words: its effects join the explanation, and those of ours that are then no longer needed leave it. What is
+left of the difference is tested by likelihood ratio: how much worse the recording is met when an effect's
+coefficients are held at the other side's values and all else is free.
+"""
+
+from collections.abc import Iterable
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from scipy.stats import chi2
+
+from host.catalogue import BY_NAME
+from host.diagnosis.fitter import Explanation, Fitter
+from host.diagnosis.search import NAMING_MARGIN
+from host.equations import NAMES, PARAMETERS
+from host.uncertainty import covariance
+
+SIGNIFICANCE = 1e-3  # chance that one of two equal coefficients is called different
+Status = Literal["missing", "superfluous", "different", "same"]
+Value = tuple[float, float]
+"""A coefficient and its deviation."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Side:
+    """What the other side holds: its effects, and all its coefficients by parameter name."""
+
+    names: frozenset[str]
+    values: dict[str, Value]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EffectDifference:
+    """One effect on both sides; `recorded` or `given` is empty where that side lacks it.
+
+    status    "missing" in the other side, "superfluous" there, held there with a "different" coefficient, or
+              the "same" as far as the recording can tell
+    evidence  2 log-likelihood (BIC for "missing") that the recording loses if the other side is right
+    """
+
+    name: str
+    status: Status
+    recorded: dict[str, Value]
+    given: dict[str, Value]
+    evidence: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParameterDifference:
+    """One coefficient of the base equations on both sides."""
+
+    name: str
+    recorded: Value
+    given: Value
+    is_different: bool
+
+    @property
+    def deviations(self) -> float:
+        """The difference over its standard deviation."""
+        spread = float(np.hypot(self.recorded[1], self.given[1]))
+        return abs(self.recorded[0] - self.given[0]) / max(spread, 1e-300)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """The differences, strongest evidence first."""
+
+    effects: list[EffectDifference]
+    parameters: list[ParameterDifference]
+
+    def named(self, *status: Status) -> list[EffectDifference]:
+        return [effect for effect in self.effects if effect.status in status]
+
+    @property
+    def is_equal(self) -> bool:
+        differs = [parameter for parameter in self.parameters if parameter.is_different]
+        return not differs and not self.named("missing", "superfluous", "different")
+
+
+def side_of(explanation: Explanation) -> Side:
+    """An explanation as the other side of a comparison."""
+    return Side(names=explanation.names, values=_values(explanation))
+
+
+def compare(fitter: Fitter, own: Explanation, other: Side) -> Comparison:
+    """Sets the explanation of the fitter's recordings against the other side."""
+    joint = _in_words_of(fitter, own, other)
+    free = fitter.free(joint.names)
+    is_free = dict(zip(joint.fit.structure.names, free.tolist(), strict=True))
+    recorded = _values(joint)
+    effects = []
+    for name in joint.names:
+        mine = _of(name, recorded)
+        worth = fitter.shrunk(joint, name).bic - joint.bic
+        if name not in other.names:
+            effects.append(
+                EffectDifference(name=name, status="missing", recorded=mine, given={}, evidence=worth)
+            )
+            continue
+        given = _of(name, other.values)
+        compared = [key for key in given if is_free[key]]
+        cost = _cost(fitter, joint, {key: given[key] for key in compared}) / _doubt(mine, given, compared)
+        status: Status = "same"
+        if cost > chi2.isf(SIGNIFICANCE, max(len(compared), 1)):
+            status = "different" if worth > NAMING_MARGIN else "superfluous"
+        kept = {} if status == "superfluous" else mine
+        effects.append(EffectDifference(name=name, status=status, recorded=kept, given=given, evidence=cost))
+    limit = float(np.sqrt(chi2.isf(SIGNIFICANCE, 1)))
+    parameters = []
+    for name in NAMES:
+        if is_free[name]:
+            pair = ParameterDifference(
+                name=name, recorded=recorded[name], given=other.values[name], is_different=False
+            )
+            parameters.append(replace(pair, is_different=pair.deviations > limit))
+    return Comparison(effects=sorted(effects, key=lambda effect: -effect.evidence), parameters=parameters)
+
+
+def _in_words_of(fitter: Fitter, own: Explanation, other: Side) -> Explanation:
+    """The recording explained with the other side's effects, ours only where those do not do."""
+    joint = fitter.polished(own)
+    for name in sorted(other.names - own.names):
+        start = np.array([value for value, _ in _of(name, other.values).values()])
+        joint = fitter.polished(fitter.grown(joint, name, [start]))
+    for _ in own.names - other.names:
+        fewer = [fitter.shrunk(joint, name) for name in joint.names - other.names]
+        leanest = min(fewer, key=lambda explanation: explanation.bic, default=joint)
+        if leanest is joint or leanest.bic > joint.bic + NAMING_MARGIN:
+            break
+        joint = leanest
+    return joint
+
+
+def _cost(fitter: Fitter, joint: Explanation, held: dict[str, Value]) -> float:
+    """2 log-likelihood lost when some coefficients are held, all others free."""
+    strict = copy(fitter)
+    strict.held = fitter.held | {name: value for name, (value, _) in held.items()}
+    parameters = joint.fit.parameters.copy()
+    for name, (value, _) in held.items():
+        parameters[joint.fit.structure.names.index(name)] = value
+    start = Explanation(joint.names, replace(joint.fit, parameters=parameters), joint.bic)
+    lost = joint.fit.log_likelihood - strict.polished(start).fit.log_likelihood
+    return max(2.0 * lost, 0.0)
+
+
+def _doubt(mine: dict[str, Value], given: dict[str, Value], names: Iterable[str]) -> float:
+    """By how much the other side's own uncertainty adds to the recording's, as a ratio of variances."""
+    ratios = [(given[name][1] / max(mine[name][1], 1e-300)) ** 2 for name in names]
+    return 1.0 + float(np.mean(ratios)) if ratios else 1.0
+
+
+def _values(explanation: Explanation) -> dict[str, Value]:
+    fit = explanation.fit
+    std = np.sqrt(np.diag(covariance(fit))).tolist()
+    pairs = zip(fit.parameters.tolist(), std, strict=True)
+    return dict(zip(fit.structure.names, pairs, strict=True))
+
+
+def _of(name: str, values: dict[str, Value]) -> dict[str, Value]:
+    return {parameter.name: values[parameter.name] for parameter in BY_NAME[name].parameters}
+
+
+def as_json(found: Comparison, given: str) -> dict[str, Any]:
+    """The differences as plain values; the other side under the key `given`."""
+    units = {p.name: p.unit for p in PARAMETERS}
+
+    def values(side: dict[str, Value], name: str) -> dict[str, Any] | None:
+        unit = {p.name: p.unit for p in BY_NAME[name].parameters}
+        return {k: {"value": v, "std": s, "unit": unit[k]} for k, (v, s) in side.items()} or None
+
+    return {
+        "effects": [
+            {
+                "name": effect.name,
+                "status": effect.status,
+                "recording": values(effect.recorded, effect.name),
+                given: values(effect.given, effect.name),
+                "evidence": effect.evidence,
+            }
+            for effect in found.effects
+        ],
+        "parameters": [
+            {
+                "name": one.name,
+                "unit": units[one.name],
+                "recording": {"value": one.recorded[0], "std": one.recorded[1]},
+                given: {"value": one.given[0], "std": one.given[1]},
+                "is_different": one.is_different,
+            }
+            for one in found.parameters
+        ],
+        "sentences": sentences(found, given),
+    }
+
+
+def sentences(found: Comparison, given: str) -> list[str]:
+    """What differs, a sentence each; `given` is what the other side is called."""
+    said = []
+    for effect in found.effects:
+        title = effect.name.replace("_", " ")
+        unit = {p.name: p.unit for p in BY_NAME[effect.name].parameters}
+        if effect.status == "missing":
+            listed = ", ".join(_said(k, v, s, unit[k]) for k, (v, s) in effect.recorded.items())
+            said.append(f"{title} is missing from the {given}: {listed}.")
+        elif effect.status == "superfluous":
+            listed = ", ".join(_said(k, v, s, unit[k]) for k, (v, s) in effect.given.items())
+            said.append(f"{title} is too much in the {given} ({listed}): the recording shows none of it.")
+        elif effect.status == "different":
+            pairs = ", ".join(
+                f"{_said(k, *effect.given[k], unit[k])} instead of {_figure(*effect.recorded[k])}"
+                for k in effect.given
+            )
+            said.append(f"{title} is in the {given}, but with {pairs}.")
+    units = {p.name: p.unit for p in PARAMETERS}
+    for one in found.parameters:
+        if one.is_different:
+            said.append(
+                f"{_said(one.name, *one.given, units[one.name])} in the {given}, but "
+                f"{_figure(*one.recorded)} in the recording."
+            )
+    return said or [f"The {given} holds the physics that the recording shows, with the same coefficients."]
+
+
+def _said(name: str, value: float, std: float, unit: str) -> str:
+    return f"{name} = {_figure(value, std)} {unit}"
+
+
+def _figure(value: float, std: float) -> str:
+    return f"{value:.4g} +- {std:.2g}" if std > 0.0 else f"{value:.4g}"
