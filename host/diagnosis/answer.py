@@ -5,6 +5,7 @@ from typing import Any, Literal
 
 from host.diagnosis.comparison import Comparison, as_json, sentences
 from host.diagnosis.diagnose import Diagnosis
+from host.diagnosis.separation import Separation
 from host.recording import Recording
 
 
@@ -34,7 +35,15 @@ class Against:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """The diagnosis and what belongs to it; without `against` the base was fitted to the recording."""
+    """The diagnosis and what belongs to it; without `against` the base was fitted to the recording.
+
+    separations  how to tell each named effect from its twins
+    """
 
     found: Diagnosis
+    separations: list[Separation] = field(default_factory=list)
     against: Against | None = None
+
+    def separating(self, name: str) -> list[Separation]:
+        """Those of one effect."""
+        return [one for one in self.separations if one.effect == name]

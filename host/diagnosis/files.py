@@ -49,7 +49,19 @@ def document(answer: Answer) -> dict[str, Any]:
                 },
                 "evidence": {"delta_bic": effect.delta_bic, "heldout_gain": effect.heldout_gain},
                 "indistinguishable_from": effect.twins,
-                "separating_manoeuvre": BY_NAME[effect.name].manoeuvre,
+                "separating_manoeuvre": "; ".join(one.sentence for one in answer.separating(effect.name))
+                or BY_NAME[effect.name].manoeuvre,
+                "separation": [
+                    {
+                        "from": one.twin,
+                        "manoeuvre": None if one.manoeuvre is None else one.manoeuvre.words,
+                        "duration_s": None if one.manoeuvre is None else one.manoeuvre.duration,
+                        "predicted_delta_chi2": one.predicted,
+                        "confirmed_delta_bic": one.confirmed,
+                        "sentence": one.sentence,
+                    }
+                    for one in answer.separating(effect.name)
+                ],
             }
             for effect in found.effects
         ],

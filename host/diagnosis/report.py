@@ -39,7 +39,7 @@ def write_report(answer: Answer, vehicle: str, path: Path) -> None:
         region=location.region[:1].upper() + location.region[1:],
         spans=_spans(found),
         band=f"Its power lies between {location.band[0]:.3f} and {location.band[1]:.3f} Hz.",
-        next_steps=next_steps(found),
+        next_steps=next_steps(answer),
         plots={"runs": _runs_plot(found), "slots": _slots_plot(found), "force": _force_plot(found)},
     )
     path.write_text(page, encoding="utf-8")
@@ -76,19 +76,15 @@ def summary(answer: Answer) -> str:
     return f"{lead} With it, {gain} {where}."
 
 
-def next_steps(found: Diagnosis) -> list[str]:
+def next_steps(answer: Answer) -> list[str]:
     """What a user should do with this answer."""
+    found = answer.found
     steps = []
     if found.effects:
         steps.append(
             "Use extended_model.json for simulation and control design (mils simulate, mils predict)."
         )
-    for effect in found.effects:
-        if effect.twins:
-            steps.append(
-                f"To tell {title(effect.name)} from {', '.join(map(title, effect.twins))}: "
-                f"{BY_NAME[effect.name].manoeuvre}."
-            )
+    steps += [f"{one.sentence[:1].upper()}{one.sentence[1:]}." for one in answer.separations]
     if found.verdict == "no_mismatch":
         steps.append("Use the identified model; fly larger manoeuvres to learn where it ends.")
     if found.verdict in ("partly_explained", "unexplained"):

@@ -3,6 +3,7 @@
 import argparse
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from tools.bench import load_vehicle, progress, read_all, require_bench
@@ -48,11 +49,13 @@ def run(args: argparse.Namespace) -> int:
         from host.diagnosis.files import write_diagnosis, write_extended_model
         from host.diagnosis.given_model import against_model
         from host.diagnosis.report import summary, title, write_report
+        from host.diagnosis.separation import separations
 
         answer = Answer(found=diagnose(recordings, say, jobs))
         if model is not None:
             say("against the model")
             answer = against_model(answer.found, model, args.model.name)
+        answer = replace(answer, separations=separations(answer.found, say))
         found = answer.found
         args.out.mkdir(parents=True, exist_ok=True)
         write_diagnosis(answer, args.out / "diagnosis.json")
@@ -67,6 +70,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"  {effect.name}{twins}")
         for name, (value, std, unit) in effect.coefficients.items():
             print(f"    {name:20s} {value:+.5g} +- {std:.2g} {unit}")
+        for separation in answer.separating(effect.name):
+            print(f"    {separation.sentence}")
     print(f"  {found.remaining}")
     print(f"report: {args.out / 'report.html'}")
     return 0 if found.verdict in ("no_mismatch", "explained") else 1
