@@ -13,8 +13,9 @@ from host.recording import Recording
 class Against:
     """What was set against the recording.
 
-    details    more for diagnosis.json
-    recorded   a simulation's own run, for the pictures; empty for a model
+    details        more for diagnosis.json
+    recorded       a simulation's own run as the recording's sensors would see it; empty for a model
+    is_understood  False where a simulation holds physics that the catalogue does not explain
     """
 
     kind: Literal["model", "simulation"]
@@ -22,15 +23,19 @@ class Against:
     comparison: Comparison
     details: dict[str, Any] = field(default_factory=dict)
     recorded: list[Recording] = field(default_factory=list)
+    is_understood: bool = True
 
     @property
     def sentences(self) -> list[str]:
         """What differs, in words."""
-        return sentences(self.comparison, self.kind)
+        doubt = (
+            "The simulation holds physics that the catalogue does not explain: what follows is part of it."
+        )
+        return [doubt] * (not self.is_understood) + sentences(self.comparison, self.kind)
 
     def as_json(self) -> dict[str, Any]:
         """The key "model" or "simulation" of diagnosis.json."""
-        return {"file": self.name, **self.details, **as_json(self.comparison, self.kind)}
+        return {"file": self.name, **self.details, **as_json(self.comparison, self.kind), "sentences": self.sentences}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

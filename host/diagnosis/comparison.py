@@ -194,7 +194,6 @@ def as_json(found: Comparison, given: str) -> dict[str, Any]:
             }
             for one in found.parameters
         ],
-        "sentences": sentences(found, given),
     }
 
 

@@ -23,7 +23,7 @@ RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exac
 FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
 # Enough to rank sets; those that count are polished.
 FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 12, 0.2
-PERIODS_TRIED = 3
+LINES_TRIED = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,19 +226,20 @@ class Fitter:
         longest = max(range(len(self.recordings)), key=lambda k: self.recordings[k].duration)
         step, residual = self.recordings[longest].step, fit.whitened[longest][1]
         filled = np.where(np.isfinite(residual), residual - np.nanmean(residual), 0.0)
-        # Padded fourfold, as phases drift over the whole span; depth is the integral of the water's motion.
-        rows = 4 * filled.size
+        rows = 4 * filled.size  # padded fourfold, as phases drift over the whole span
         frequencies = np.fft.rfftfreq(rows, step)[1:]
-        velocity = np.abs(np.fft.rfft(filled, rows))[1:] * frequencies
+        size = np.abs(np.fft.rfft(filled, rows))[1:]
         span = step * filled.size
         inside = (frequencies >= 1.0 / min(limits[1], 1.5 * span)) & (frequencies <= 1.0 / limits[0])
-        periods: list[float] = []
-        for k in np.flatnonzero(inside)[np.argsort(-velocity[inside])]:
-            if all(abs(frequencies[k] - 1.0 / other) > 1.0 / span for other in periods):
-                periods.append(float(1.0 / frequencies[k]))
-            if len(periods) == PERIODS_TRIED:
+        # What is slower than the recording is long has no line of its own, and the base bends to it.
+        periods = [share * span for share in (0.3, 0.7) if limits[0] < share * span < limits[1]]
+        lines: list[float] = []
+        for k in np.flatnonzero(inside)[np.argsort(-size[inside])]:
+            if all(abs(frequencies[k] - line) > 1.0 / span for line in lines):
+                lines.append(float(frequencies[k]))
+            if len(lines) == LINES_TRIED:
                 break
-        return periods or [limits[0]]
+        return [*(1.0 / line for line in lines), *periods] or [limits[0]]
 
     def _guess(self, start: Point, names: Names) -> Point:
         """The rough values of regression where it gives some, `start` elsewhere, moved into their valley."""

@@ -19,9 +19,10 @@ from host.recording import Array
 NAMING_MARGIN = 10.0  # of BIC, beyond which an effect pays; holds false naming down over the whole catalogue
 TWIN_MARGIN = 6.0  # of BIC, odds of 20 to 1: explanations closer than this cannot be told apart
 LARGEST_CLASS = 3  # a longer list of alternatives helps nobody
-BEAM = 4  # sets carried on
+BEAM = 4  # single effects carried on
 FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
-PROMISING = 6
+NARROW = 2  # of larger sets, which cost most and of which there are most
+PROMISING, FEW = 6, 3
 RIVALS = 5
 ROUGH = 60.0  # of BIC, that a fit of the search may gain by polishing
 LARGEST_SET = 5
@@ -54,7 +55,7 @@ class Search:
         for size in range(1, LARGEST_SET + 1):
             grown = self._grown(beam, size)
             best_before = min(e.bic for e in beam)
-            beam = self._parents(grown)
+            beam = self._parents(grown)[: BEAM if size == 1 else NARROW]
             if not beam or beam[0].bic > best_before - NAMING_MARGIN:
                 break
         return self._settled()
@@ -117,9 +118,10 @@ class Search:
         if size == 1 and not self.root.fit.has_process_noise:
             return others
         gains = self.gains(parent, is_leading)
-        best = sorted(gains, key=lambda name: -gains[name])[:PROMISING]
+        best = sorted(gains, key=lambda name: -gains[name])[: PROMISING if size == 2 else FEW]
         worth = {name for name in best if gains[name] > NAMING_MARGIN}
-        is_far = self.fitter.excess(parent.fit) > NEAR and not self.root.fit.has_process_noise
+        is_far = size <= 2 and self.fitter.excess(parent.fit) > NEAR
+        is_far &= not self.root.fit.has_process_noise
         return [name for name in others if name in worth or (is_far and BY_NAME[name].is_common)]
 
     def _values(self, name: str) -> list[Array]:

@@ -1,0 +1,123 @@
+"""A simulator's output on the recording's own rudder: which physics it holds, against what the recording shows.
+
+The simulation is diagnosed like a recording, through the recording's own sensors: its rows, its losses, and
+white noise as large as theirs, from a fixed seed. So only physics that matters at that noise is named, and
+what a simulator's integrator leaves is not.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from host.diagnosis.answer import Against, Answer
+from host.diagnosis.comparison import compare, side_of
+from host.diagnosis.diagnose import Diagnosis, diagnose
+from host.diagnosis.fitter import Fitter
+from host.errors import RecordingError
+from host.recording import Array, Recording
+
+SEED = 0
+RUDDER_DOUBT = 0.05  # of the recorded rudder's spread, rms: beyond it the simulation flew something else
+
+
+def against_simulation(
+    found: Diagnosis,
+    simulated: list[Recording],
+    on_progress: Callable[[str], None] = lambda _: None,
+    jobs: int = 1,
+) -> Answer:
+    """Sets what a simulation contains against what the recording does; the diagnosis itself stays.
+
+    simulated  as of `through_sensors_of`
+    """
+    on_progress("diagnosis of the simulation")
+    theirs = diagnose(simulated, lambda stage: on_progress(f"simulation: {stage}"), jobs)
+    on_progress("simulation against recording")
+    fitter = Fitter(found.recordings, known=found.extended)
+    comparison = compare(fitter, found.extended, side_of(theirs.extended))
+    errors = [
+        np.vstack([r.pitch - s.pitch, r.depth - s.depth])
+        for r, s in zip(found.recordings, simulated, strict=True)
+    ]
+    both = np.sqrt(np.nanmean(np.hstack(errors) ** 2, axis=1))
+    details = {
+        "sha256": simulated[0].sha256,
+        "verdict": theirs.verdict,
+        "contains": [effect.name for effect in theirs.effects],
+        "remaining": theirs.remaining,
+        "added_noise": {
+            "pitch_rad": float(np.sqrt(found.floor[0])),
+            "depth_m": float(np.sqrt(found.floor[1])),
+            "seed": SEED,
+        },
+        "depth_rmse_m": float(both[1]),
+        "pitch_rmse_rad": float(both[0]),
+    }
+    against = Against(
+        kind="simulation",
+        name=simulated[0].name,
+        comparison=comparison,
+        details=details,
+        recorded=simulated,
+        is_understood=theirs.verdict in ("no_mismatch", "explained"),
+    )
+    return Answer(found=found, against=against)
+
+
+def through_sensors_of(
+    recordings: list[Recording], simulated: list[Recording], floor: Array
+) -> list[Recording]:
+    """The simulation at the recording's rows, with its losses and noise of its floor (2,), rad^2 and m^2.
+
+    Raises RecordingError with one line when the two do not share recorded file, time span or rudder.
+    """
+    if len({recording.name for recording in recordings}) > 1:
+        raise RecordingError("--simulation goes with one recording: that whose rudder it flew")
+    rng = np.random.default_rng(SEED)
+    return [_seen(recording, _covering(recording, simulated), floor, rng) for recording in recordings]
+
+
+def _covering(recording: Recording, simulated: list[Recording]) -> Recording:
+    start, end = float(recording.time[0]), float(recording.time[-1])
+    for one in simulated:
+        slack = max(one.step, recording.step) * 1.5
+        if one.time[0] <= start + slack and one.time[-1] >= end - slack:
+            return one
+    spans = ", ".join(f"{one.time[0]:.6g} to {one.time[-1]:.6g} s" for one in simulated)
+    raise RecordingError(
+        f"{simulated[0].name}: must cover {start:.6g} to {end:.6g} s of {recording.name} (it has {spans})"
+    )
+
+
+def _seen(recording: Recording, one: Recording, floor: Array, rng: np.random.Generator) -> Recording:
+    latest = np.searchsorted(one.time, recording.time + 1e-6 * one.step, side="right") - 1
+    rudder = one.rudder[np.clip(latest, 0, one.time.size - 1)]
+    apart = float(np.sqrt(np.mean((rudder - recording.rudder) ** 2)))
+    if apart > RUDDER_DOUBT * max(float(np.std(recording.rudder)), 1e-6):
+        raise RecordingError(
+            f"{one.name}: its rudder must be that of {recording.name} (they are {np.degrees(apart):.3g} deg "
+            "rms apart); simulate on the recorded rudder"
+        )
+    noise = np.sqrt(floor)[:, None] * rng.standard_normal((2, recording.time.size))
+    pitch, depth = (_at(one, values, recording.time) for values in (one.pitch, one.depth))
+    speed = np.full(recording.time.size, np.nan)
+    if recording.has_speed and one.has_speed:
+        speed = np.interp(recording.time, one.time, one.speed)
+    return replace(
+        recording,
+        name=one.name,
+        sha256=one.sha256,
+        pitch=np.where(np.isfinite(recording.pitch), pitch + noise[0], np.nan),
+        depth=np.where(np.isfinite(recording.depth), depth + noise[1], np.nan),
+        speed=speed,
+        pitch_rate=np.full(recording.time.size, np.nan),
+    )
+
+
+def _at(one: Recording, values: Array, time: Array) -> Array:
+    """The simulated motion between its rows; it is smooth, so a cubic spline."""
+    known = np.isfinite(values)
+    first, last = one.time[known][[0, -1]]
+    return np.asarray(CubicSpline(one.time[known], values[known])(np.clip(time, first, last)))
