@@ -35,7 +35,12 @@ class Against:
 
     def as_json(self) -> dict[str, Any]:
         """The key "model" or "simulation" of diagnosis.json."""
-        return {"file": self.name, **self.details, **as_json(self.comparison, self.kind), "sentences": self.sentences}
+        return {
+            "file": self.name,
+            **self.details,
+            **as_json(self.comparison, self.kind),
+            "sentences": self.sentences,
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

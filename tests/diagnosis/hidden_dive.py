@@ -16,8 +16,10 @@ def nothing(time: float, x: Array, plane: float) -> tuple[float, float, float]: 
     return 0.0, 0.0, 0.0
 
 
-def hidden_dive(extra: Extra = nothing, *, seed: int = 0, duration: float = 90.0) -> Recording:
-    """A dive of the paper's vehicle; `extra` adds to w', q' and zeta'."""
+def hidden_dive(
+    extra: Extra = nothing, *, seed: int = 0, duration: float = 90.0, noise: float = 1.0
+) -> Recording:
+    """A dive of the paper's vehicle; `extra` adds to w', q' and zeta'. `noise` scales that of the sensors."""
     rng = np.random.default_rng(seed)
     h, rows = 0.1, round(duration / 0.1)
     rudder, at = np.empty(rows), 0
@@ -47,8 +49,8 @@ def hidden_dive(extra: Extra = nothing, *, seed: int = 0, duration: float = 90.0
         name="hidden.csv",
         sha256="0" * 64,
         time=np.arange(rows) * h,
-        depth=states[3] + 0.01 * rng.standard_normal(rows),
-        pitch=states[2] + np.deg2rad(0.1) * rng.standard_normal(rows),
+        depth=states[3] + noise * 0.01 * rng.standard_normal(rows),
+        pitch=states[2] + noise * np.deg2rad(0.1) * rng.standard_normal(rows),
         rudder=rudder,
         speed=nan,
         pitch_rate=nan,

@@ -6,6 +6,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+from host.recording import Recording
 from tools.bench import load_vehicle, progress, read_all, require_bench
 
 
@@ -13,11 +14,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "recordings", metavar="RECORDING", nargs="+", type=Path, help=".csv .tlog .BIN .log .asc .blf .jsonl"
     )
-    parser.add_argument(
+    other = parser.add_mutually_exclusive_group()
+    other.add_argument(
         "--model",
         type=Path,
         metavar="M.json",
         help="set this model, as it is, against the recording, in place of a base fitted to it",
+    )
+    other.add_argument(
+        "--simulation",
+        type=Path,
+        metavar="SIM.csv",
+        help="a simulator's output on the same rudder: say what physics it lacks, and what it has too much",
     )
     parser.add_argument("--vehicle", type=Path, help="vehicle file: columns, units, channels, speed")
     parser.add_argument(
@@ -48,13 +56,20 @@ def run(args: argparse.Namespace) -> int:
         from host.diagnosis.diagnose import diagnose
         from host.diagnosis.files import write_diagnosis, write_extended_model
         from host.diagnosis.given_model import against_model
+        from host.diagnosis.given_simulation import against_simulation, check_same_flight
         from host.diagnosis.report import summary, title, write_report
         from host.diagnosis.separation import separations
 
+        simulated: list[Recording] = []
+        if args.simulation is not None:
+            simulated = read_all([args.simulation], vehicle, say)
+            check_same_flight(recordings, simulated)
         answer = Answer(found=diagnose(recordings, say, jobs))
         if model is not None:
             say("against the model")
             answer = against_model(answer.found, model, args.model.name)
+        if simulated:
+            answer = against_simulation(answer.found, simulated, say, jobs)
         answer = replace(answer, separations=separations(answer.found, say))
         found = answer.found
         args.out.mkdir(parents=True, exist_ok=True)

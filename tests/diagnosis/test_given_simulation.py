@@ -1,0 +1,116 @@
+"""A simulator's output set against a recording: what it lacks, and what it has too much."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hidden_dive import hidden_dive
+
+from host.diagnosis.answer import Answer
+from host.diagnosis.diagnose import Diagnosis
+from host.diagnosis.files import document
+from host.diagnosis.given_simulation import against_simulation, check_same_flight
+from host.errors import RecordingError
+from host.recording import Recording
+from tools.cli import main
+
+
+def drag(_: float, x: np.ndarray, __: float) -> tuple[float, float, float]:  # type: ignore[type-arg]
+    return -2.0 * x[0] * abs(x[0]), 0.0, 0.0
+
+
+def write(dive: Recording, path: Path) -> str:
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["time_s", "depth_m", "pitch_rad", "rudder_rad"])
+        writer.writerows(zip(dive.time, dive.depth, dive.pitch, dive.rudder, strict=True))
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def answer(coupled: Diagnosis) -> Answer:
+    """The recording couples pitch rate into heave; the simulation has quadratic drag in its place."""
+    return against_simulation(coupled, [replace(hidden_dive(drag, seed=1, noise=0.0), name="sim.csv")])
+
+
+def test_what_the_simulation_lacks_and_has_too_much(answer: Answer) -> None:
+    assert answer.against is not None
+    (missing,) = answer.against.comparison.named("missing")
+    (superfluous,) = answer.against.comparison.named("superfluous")
+    assert missing.name == "heave_pitch_rate_coupling"
+    assert missing.recorded["c_wq"][0] == pytest.approx(0.8, abs=4.0 * missing.recorded["c_wq"][1])
+    assert superfluous.name == "heave_quadratic_drag"
+    assert superfluous.given["c_ww"][0] == pytest.approx(-2.0, abs=0.2)
+    assert not any(parameter.is_different for parameter in answer.against.comparison.parameters)
+
+
+def test_the_answer_in_the_file(answer: Answer) -> None:
+    simulation = document(answer)["simulation"]
+    assert simulation["file"] == "sim.csv"
+    assert simulation["contains"] == ["heave_quadratic_drag"]
+    assert simulation["added_noise"]["depth_m"] == pytest.approx(0.01, rel=0.2)
+    status = {effect["name"]: effect["status"] for effect in simulation["effects"]}
+    assert status == {"heave_pitch_rate_coupling": "missing", "heave_quadratic_drag": "superfluous"}
+    assert any("is missing from the simulation" in sentence for sentence in simulation["sentences"])
+
+
+def test_a_weaker_effect_in_the_simulation_is_no_missing_one(coupled: Diagnosis) -> None:
+    weak = hidden_dive(lambda _, x, __: (0.3 * x[1], 0.0, 0.0), seed=1, noise=0.0)
+    answer = against_simulation(coupled, [weak])
+    assert answer.against is not None
+    (different,) = answer.against.comparison.effects
+    assert different.status == "different"
+    assert different.given["c_wq"][0] == pytest.approx(0.3, abs=0.06)
+
+
+def test_a_simulation_in_finer_steps_is_read_at_the_recorded_rows(coupled: Diagnosis) -> None:
+    coarse = hidden_dive(seed=1, noise=0.0)
+    fine = np.arange(2 * coarse.time.size - 1) * 0.05
+    simulated = replace(
+        coarse,
+        time=fine,
+        depth=np.interp(fine, coarse.time, coarse.depth),
+        pitch=np.interp(fine, coarse.time, coarse.pitch),
+        rudder=np.repeat(coarse.rudder, 2)[: fine.size],
+        speed=np.full(fine.size, np.nan),
+        pitch_rate=np.full(fine.size, np.nan),
+        step=0.05,
+    )
+    check_same_flight(coupled.recordings, [simulated])
+
+
+@pytest.mark.parametrize(
+    ("simulated", "complaint"),
+    [
+        (hidden_dive(seed=2, duration=30.0), "its rudder must be that of"),
+        (hidden_dive(seed=1, duration=20.0), "must cover 0 to 29.9 s"),
+    ],
+)
+def test_a_simulation_of_something_else_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], simulated: Recording, complaint: str
+) -> None:
+    dive = write(hidden_dive(seed=1, duration=30.0), tmp_path / "dive.csv")
+    sim = write(simulated, tmp_path / "sim.csv")
+    assert main(["diagnose", dive, "--simulation", sim, "--quiet"]) == 2
+    error = capsys.readouterr().err
+    assert complaint in error
+    assert error.count("\n") == 1
+
+
+def test_one_simulation_belongs_to_one_recording() -> None:
+    dives = [replace(hidden_dive(seed=1, duration=20.0), name=f"{k}.csv") for k in range(2)]
+    with pytest.raises(RecordingError, match="goes with one recording"):
+        check_same_flight(dives, dives[:1])
+
+
+def test_the_command_says_that_a_true_simulation_lacks_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dive = write(hidden_dive(seed=3, duration=60.0), tmp_path / "dive.csv")
+    sim = write(hidden_dive(seed=3, duration=60.0, noise=0.0), tmp_path / "sim.csv")
+    assert main(["diagnose", dive, "--simulation", sim, "--out", str(tmp_path), "--quiet"]) == 0
+    assert "The simulation holds the physics that the recording shows" in capsys.readouterr().out
+    assert json.loads((tmp_path / "diagnosis.json").read_text())["simulation"]["effects"] == []
