@@ -102,6 +102,7 @@ class PredictionError:
         self.pitch_is_at_bound = False
         for sensor in (self.pitch, self.depth):
             sensor.reset()
+        self._instant = 0
         self.restart()
 
     def _set_prior(self) -> None:
@@ -134,6 +135,11 @@ class PredictionError:
 
     def restart(self) -> None:
         """Forgets the states and keeps the parameters, as after a gap."""
+        self.pitch.clear()
+        self.depth.clear()
+        self._forget_states()
+
+    def _forget_states(self) -> None:
         for entry in (W, Q, THETA, ZETA):
             self.ud.forget(entry, 0.0, self._prior.variance[entry])
         self.pitch.restart()
@@ -148,7 +154,7 @@ class PredictionError:
 
     def restart_pitch(self) -> None:
         """Forgets the states and the trims: a pitch of another datum needs other forces to hold it."""
-        self.restart()
+        self._forget_states()
         for entry in (HEAVE_TRIM, PITCH_TRIM):
             self._widen(entry, self._prior.variance[entry])
 
@@ -172,7 +178,7 @@ class PredictionError:
                 self._adopt(speed)
             else:
                 self._set_prior()
-                self.restart()
+                self._forget_states()
                 self.ud.D[GAMMA] = 0.0
                 self.ud.D[KAPPA] = self._prior.coupling if self.has_coupling else 0.0
         self.speed = speed
@@ -187,10 +193,16 @@ class PredictionError:
         ud.observe_entry(GAMMA, -ud.x[GAMMA], EXACT)
         if not self._coupling:
             ud.observe_entry(KAPPA, -ud.x[KAPPA], EXACT)
-        self.restart()
+        self._forget_states()
 
     def predict(self, rudder: float, is_excited: bool, doubt: float = 0.0) -> None:
-        """Moves one step on, the rudder held; `doubt` is the density of a white error in it, rad^2 s."""
+        """Moves one step on, the rudder held; `doubt` is the density of a white error in it, rad^2 s.
+
+        The states stay what they are at the start until a sensor tells where they are.
+        """
+        self._instant += 1
+        if not self.is_started:
+            return
         ud, moments, noise = self.ud, self._moments, self._noise
         heave_doubt = doubt * (ud.x[B1] * ud.x[B1] + ud.covariance(B1, B1)) if doubt > 0.0 else 0.0
         pitch_doubt = doubt * (ud.x[B2] * ud.x[B2] + ud.covariance(B2, B2)) if doubt > 0.0 else 0.0
@@ -230,6 +242,15 @@ class PredictionError:
         if entry == KAPPA and not self.has_coupling:
             row[GAMMA] = ud.x[A1]
         ud.add(row, self._drift * size * self._step * len(WANDERING))
+
+    @property
+    def is_started(self) -> bool:
+        """Whether a sensor tells where the vehicle is."""
+        return self.pitch.is_started or self.depth.is_started
+
+    def admits(self, sensor: Sensor, value: float) -> bool:
+        """`Sensor.admits` at this instant."""
+        return sensor.admits(self._instant, value)
 
     def learn(self, sensor: Sensor, value: float) -> None:
         """One update with a measured value."""

@@ -40,6 +40,8 @@ class RobustEstimator:
     a rudder waits for the next one that has it: if the rudder came back the same, it was held; if another,
     it turned once on the way, nobody knows when. Without it for more than `rudder_hold` s the states of the
     vehicle start anew and the parameters are kept.
+    A sensor is followed once its last values agree, and for a while only where they agree: while nothing is
+    known of the states, a spike would pass for a movement, and the parameters be bent to explain it.
     A measured speed is taken as it comes (the median of the last three), and held.
     """
 
@@ -132,12 +134,13 @@ class RobustEstimator:
         if self._is_frozen or self._rest > self.config.rest_time:
             self._lose_states()
             return Status.FROZEN if self._is_frozen else Status.NOT_EXCITED
-        is_new = math.isnan(self._rudder)
-        if is_new:
+        if math.isnan(self._rudder):
             if math.isnan(sample.rudder):
                 return Status.WAITING
             self._filter.restart()
+            is_new = True
         else:
+            is_new = not self._filter.is_started
             self._bridge(sample.rudder, missed + 1, is_excited)
         status = self._learn(sample.pitch, sample.depth)
         self._rudder = sample.rudder
@@ -207,12 +210,15 @@ class RobustEstimator:
         """One measured value; outliers that do not end mean that the sensor has another datum."""
         if math.isnan(value):
             return Status.WAITING
+        if not self._filter.admits(sensor, value):
+            return Status.REFUSED_OUTLIER if sensor.is_started else Status.WAITING
         if not sensor.is_outlier(self._filter.ud, value, self._gate):
             self._outliers[sensor] = 0
             self._filter.learn(sensor, value)
             return Status.UPDATED
         self._outliers[sensor] += 1
-        if self._outliers[sensor] <= self.config.outlier_limit or not self._budget.take():
+        is_brief = self._outliers[sensor] <= self.config.outlier_limit
+        if is_brief or not sensor.has_settled or not self._budget.take():
             return Status.REFUSED_OUTLIER
         self._outliers[sensor] = 0
         if sensor is self._filter.pitch:

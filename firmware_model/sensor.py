@@ -3,10 +3,13 @@
 import math
 
 from firmware_model.noise_levels import LIKELY, ForceNoise, SensorNoise
+from firmware_model.recent_values import RecentValues
 from firmware_model.ud_factors import UdFactors
 
 HUBER = 3.0
 """Standard deviations beyond which a sample's influence does not grow any more."""
+OPENING = 5
+"""Values that must agree before a sensor is followed, and values after that which must agree with them."""
 
 
 class Sensor:
@@ -20,17 +23,42 @@ class Sensor:
         self.noise = noise
         self.force = force
         self._resolution = resolution
+        self._recent = RecentValues(OPENING)
         self.restart()
 
     def restart(self) -> None:
         """The next value is the first."""
         self.is_started = False
+        self._opening = OPENING
         self.force.forget()
+
+    def clear(self) -> None:
+        """Forgets the last values: what comes next does not follow them in time."""
+        self._recent.clear()
+
+    def admits(self, instant: int, value: float) -> bool:
+        """Whether the value may be learnt from, if it is where it is expected.
+
+        What is known of the states after a start would let any value pass; so until some more have come, only
+        one that belongs to the last values may.
+        """
+        self._recent.put(instant, value)
+        if self._opening == 0:
+            return True
+        if self.is_started:
+            self._opening -= 1
+        return self.has_settled
+
+    @property
+    def has_settled(self) -> bool:
+        """Whether the newest value is where most of the last ones are."""
+        return self._recent.newest_belongs(math.sqrt(self.noise.variance))
 
     def reset(self) -> None:
         """Forgets the noise too."""
         self.noise.reset()
         self.force.reset()
+        self.clear()
         self.restart()
 
     def is_outlier(self, ud: UdFactors, value: float, gate: float) -> bool:

@@ -18,6 +18,8 @@ CONFIG = EstimatorConfig(
 def flown():
     """A dive with everything in it that leaves the straight way."""
     samples = dive(400, 11)
+    samples[0] = replace(samples[0], pitch=0.3)
+    samples[6] = replace(samples[6], pitch=-0.2)
     samples[90] = replace(samples[90], pitch=math.nan)
     samples[91] = Sample(t_us=samples[91].t_us)
     samples[120] = replace(samples[120], depth=samples[120].depth + 3.0)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linear_dive import PITCH_NOISE, dive, held_levels, transition
-from robust_estimator import CONFIG, assert_found, estimator_of, learnt, run, with_robust
+from robust_estimator import CONFIG, assert_found, assert_starts, estimator_of, learnt, run, with_robust
 
 from firmware_model import PARAMETERS, EstimatorConfig, RobustConfig, RobustEstimator, Sample, Status
 
@@ -33,13 +33,12 @@ def test_faults_without_end_freeze_the_estimator_until_it_is_enabled(trained):
     estimator = estimator_of(trained, replace(CONFIG, outlier_gate=None))
     samples = dive(200, first=1200)
     run(estimator, samples[:20])
-    huge = [replace(sample, depth=1e300 * (k + 1.0) * (-1) ** k) for k, sample in enumerate(samples[20:150])]
+    huge = [replace(sample, depth=1e300 * (k + 1.0)) for k, sample in enumerate(samples[20:150])]
     statuses = run(estimator, huge)
     assert statuses[-1] is Status.FROZEN
     assert estimator.is_frozen
     estimator.enable()
-    assert estimator.update(samples[150]) is Status.RESTARTED
-    assert set(run(estimator, samples[151:])) == {Status.UPDATED}
+    assert_starts(run(estimator, samples[150:]))
     assert_found(estimator)
 
 
@@ -58,7 +57,7 @@ def test_rest_is_not_learnt_from_and_work_goes_on_after_it(trained):
     assert statuses[-1] is Status.UPDATED
     assert_found(estimator)
     always = estimator_of(trained, replace(CONFIG, excitation_threshold=0.0))
-    assert set(run(always, rest)[1:]) == {Status.UPDATED}
+    assert_starts(run(always, rest))
 
 
 def test_a_plane_that_only_answers_noise_makes_nothing_valid():
@@ -91,8 +90,7 @@ def test_freeze_stops_learning_and_enable_goes_on(trained):
     assert set(run(estimator, samples[50:100])) == {Status.FROZEN}
     assert learnt(estimator) == before
     estimator.enable()
-    assert estimator.update(samples[100]) is Status.RESTARTED
-    assert set(run(estimator, samples[101:])) == {Status.UPDATED}
+    assert_starts(run(estimator, samples[100:]))
 
 
 def test_a_vehicle_beyond_the_bounds_is_held_at_them_and_never_valid():

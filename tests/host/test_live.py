@@ -360,7 +360,7 @@ def test_the_noise_proof_estimator_is_what_runs_by_default(tmp_path: Path) -> No
     run = Run(tmp_path, one_instant_a_read(dive(600)), estimator={})
     end = run.run()
     assert run.vehicle.estimator.method == "robust"
-    assert end.samples == {"UPDATED": 600}
+    assert end.samples == {"WAITING": 4, "UPDATED": 596}  # four values say where the vehicle is
     published = run.sources[0].published[-1][1]
     # Euler's steps are not those of a held plane: a third is all that can be asked of these data.
     assert published["a3"] == pytest.approx(TABLE_1["a3"], rel=0.3)
