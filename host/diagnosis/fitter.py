@@ -1,6 +1,6 @@
 """Fits of sets of effects, jointly with the base, to the recordings of one vehicle."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import log
 
 import numpy as np
@@ -33,6 +33,10 @@ class Explanation:
     names: Names
     fit: Fit
     bic: float
+
+    def lean(self) -> "Explanation":
+        """Without the sensitivities of every row: those of a whole search over a long dive fill the memory."""
+        return replace(self, fit=replace(self.fit, scores=[]))
 
 
 class Fitter:

@@ -17,6 +17,7 @@ from host.recording import Array, Recording
 from host.whiteness import is_white
 
 SIGNIFICANCE = 1e-4
+SEA_DOUBT = 1.5  # no sea is as white and steady as the filter takes it to be
 GROUPS = 10
 LEAST_SEA = 0.003  # m/s; below it physics left out, not moving water, is what passes for noise
 MOVEMENT_SPAN = 0.5  # s
@@ -68,7 +69,7 @@ def leftover(fitter: Fitter, best: Explanation, among_waves: Fit | None = None) 
         is_no_sea=among_waves is None and fit.has_process_noise and _heave_by_sea(fit) < LEAST_SEA,
         is_above_floor=bool((fit.noise[:2] > doubt * fitter.floor).any()),
         smooth_gain=gain,
-        is_smooth=bool(gain > chi2.isf(SIGNIFICANCE, terms)),
+        is_smooth=bool(gain > chi2.isf(SIGNIFICANCE, terms) * (SEA_DOUBT if fit.has_process_noise else 1.0)),
     )
 
 

@@ -207,5 +207,5 @@ class Search:
     def _remember(self, explanation: Explanation) -> Explanation:
         known = self.tried.get(explanation.names)
         if known is None or explanation.bic < known.bic:
-            self.tried[explanation.names] = explanation
+            self.tried[explanation.names] = explanation.lean()
         return self.tried[explanation.names]

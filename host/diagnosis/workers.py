@@ -6,7 +6,7 @@ from concurrent.futures import ProcessPoolExecutor
 from types import TracebackType
 from typing import Any
 
-from host.diagnosis.fitter import Fitter
+from host.diagnosis.fitter import Explanation, Fitter
 
 Task = tuple[str, tuple[Any, ...]]
 """A method of Fitter and its arguments."""
@@ -55,4 +55,5 @@ def _open(*arguments: Any) -> None:
 
 
 def _call(method: str, arguments: tuple[Any, ...]) -> Any:
-    return getattr(_fitter, method)(*arguments)
+    result = getattr(_fitter, method)(*arguments)
+    return result.lean() if isinstance(result, Explanation) else result
