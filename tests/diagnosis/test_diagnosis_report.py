@@ -1,0 +1,55 @@
+"""The page that a person reads."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from host.diagnosis.answer import Against, Answer
+from host.diagnosis.comparison import compare, side_of
+from host.diagnosis.diagnose import Diagnosis
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.report import write_report
+from host.diagnosis.separation import separations
+
+
+def page(answer: Answer, tmp_path: Path) -> str:
+    write_report(answer, "boat", tmp_path / "report.html")
+    return (tmp_path / "report.html").read_text()
+
+
+def test_twins_are_shown_with_the_manoeuvre_that_decides(coupled: Diagnosis, tmp_path: Path) -> None:
+    twins = ["depth_sensor_lever_arm", "depth_sensor_lag"]
+    found = replace(coupled, effects=[replace(coupled.effects[0], twins=twins)])
+    shown = page(Answer(found=found, separations=separations(found)), tmp_path)
+    assert "This recording cannot tell it from depth sensor lever arm or depth sensor lag" in shown
+    assert "No plane movement at this speed" in shown
+    assert "Which manoeuvre decides" in shown
+    assert shown.count("data:image/png;base64,") == 5
+    assert "http" not in shown.replace("http-equiv", "")
+
+
+def test_nothing_missing_shows_no_shares(coupled: Diagnosis, tmp_path: Path) -> None:
+    slots = dict.fromkeys(coupled.slots, 0.0)
+    calm = replace(coupled, verdict="no_mismatch", effects=[], slots=slots, extended=coupled.base)
+    shown = page(Answer(found=calm), tmp_path)
+    assert "No mismatch" in shown
+    assert "What was left out" not in shown
+    assert shown.count("data:image/png;base64,") == 3
+
+
+@pytest.mark.parametrize("kind", ["model", "simulation"])
+def test_the_other_side_is_set_beside_the_recording(coupled: Diagnosis, tmp_path: Path, kind: str) -> None:
+    fitter = Fitter(coupled.recordings, known=coupled.extended)
+    comparison = compare(fitter, coupled.extended, side_of(coupled.base))
+    against = Against(kind=kind, name="theirs.csv", comparison=comparison)  # type: ignore[arg-type]
+    shown = page(Answer(found=coupled, against=against), tmp_path)
+    assert f"Your {kind} against the recording" in shown
+    assert f"missing from the {kind}" in shown
+    assert ("given model" in shown) == (kind == "model")
+
+
+def test_what_is_not_explained_is_not_recommended(coupled: Diagnosis, tmp_path: Path) -> None:
+    shown = page(Answer(found=replace(coupled, verdict="unexplained")), tmp_path)
+    assert "The nearest of the catalogue" in shown
+    assert "Use extended_model.json" not in shown
