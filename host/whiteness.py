@@ -47,3 +47,26 @@ def is_white(innovations: Array, lags: int = 20, significance: float = 0.001) ->
         if statistic > chi2.ppf(1.0 - significance, lags):
             return False
     return True
+
+
+def correlation_factor(innovations: list[Array], lags: int = 100) -> float:
+    """By how much correlated innovations count for fewer: samples over independent samples, at least 1.
+
+    Each of (outputs, N) innovations: 1 + 2 sum w_k rho_k with Parzen's window w over `lags`, or a tenth of
+    the rows; the largest over the outputs, averaged over the recordings by their length.
+    """
+    total, rows = 0.0, 0
+    for e in innovations:
+        count = min(lags, e.shape[1] // 10)
+        if count < 2:
+            continue
+        x = np.arange(1, count + 1) / count
+        window = np.where(x <= 0.5, 1.0 - 6.0 * x**2 * (1.0 - x), 2.0 * (1.0 - x) ** 3)
+        factors = [1.0]
+        for values in e:
+            if np.isfinite(values).sum() > 3 * count and np.nanstd(values) > 0.0:
+                covariance, _ = autocovariance(values, count)
+                factors.append(1.0 + 2.0 * float(window @ covariance[1:]) / float(covariance[0]))
+        total += e.shape[1] * max(factors)
+        rows += e.shape[1]
+    return total / rows if rows else 1.0

@@ -21,8 +21,10 @@ def _saturation(c: Chain) -> None:
 
 
 def _rate_limit(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:
-    moved = held + limited(c.plane - held, c.p["plane_rate"] * substep)
-    return (held + moved) / 2, moved
+    farthest = c.p["plane_rate"] * substep
+    moved = limited(c.plane - held, farthest)
+    share = ca.fmin(1, ca.fabs(c.plane - held) / farthest)  # of the sub-step that the plane is under way
+    return held + moved - moved * share / 2, held + moved
 
 
 def _lag(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -90,7 +92,7 @@ EFFECTS = (
         name="actuator_rate_limit",
         slot="actuator",
         parameters=(
-            Parameter(name="plane_rate", unit="rad/s", lower=0.005, upper=20, meaning="largest rate"),
+            Parameter(name="plane_rate", unit="rad/s", lower=0.005, upper=100, meaning="largest rate"),
         ),
         sentence="The plane turns no faster than a fixed rate.",
         equation="|delta'| <= plane_rate",

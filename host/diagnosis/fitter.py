@@ -35,7 +35,7 @@ class Explanation:
     bic: float
 
     def lean(self) -> "Explanation":
-        """Without the sensitivities of every row: those of a whole search over a long dive fill the memory."""
+        """Without the sensitivities of every row: those of a whole search fill the memory."""
         return replace(self, fit=replace(self.fit, scores=[]))
 
 

@@ -14,7 +14,7 @@ from host.diagnosis.noise_floor import is_quantised
 from host.equations import NAMES
 from host.fit import Fit
 from host.recording import Array, Recording
-from host.whiteness import is_white
+from host.whiteness import correlation_factor, is_white
 
 SIGNIFICANCE = 1e-4
 SEA_DOUBT = 1.5  # no sea is as white and steady as the filter takes it to be
@@ -34,7 +34,8 @@ class Leftover:
     is_local        they are larger in one range of the motion than in another, as those of no sea are
     is_no_sea       the fit needs random forces, but they move the vehicle less than any sea would
     is_above_floor  the sensor noise of the fit exceeds what the sensors themselves show
-    smooth_gain     twice the log-likelihood that any smooth force of the motion would gain
+    smooth_gain     twice the log-likelihood that any smooth force of the motion would gain, correlation
+                    discounted
     is_smooth       whether that is more than chance gives
     """
 
@@ -61,7 +62,7 @@ def leftover(fitter: Fitter, best: Explanation, among_waves: Fit | None = None) 
     tested = ~rounded
     doubt = np.where(rounded, ROUNDING_DOUBT, FLOOR_DOUBT)
     innovations = [e[tested] for e in fit.whitened]
-    gain = fitter.gain(best, ANY_SMOOTH_FORCE.name, [], is_thorough=True)
+    gain = fitter.gain(best, ANY_SMOOTH_FORCE.name, [], is_thorough=True) / correlation_factor(fit.whitened)
     terms = len(ANY_SMOOTH_FORCE.parameters)
     return Leftover(
         is_coloured=not all(is_white(e, significance=SIGNIFICANCE) and _is_even(e) for e in innovations),

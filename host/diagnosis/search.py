@@ -15,9 +15,10 @@ from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.fitter import Explanation, Fitter, Names
 from host.diagnosis.workers import Task, Workers
 from host.recording import Array
+from host.whiteness import correlation_factor
 
 NAMING_MARGIN = 10.0  # of BIC, beyond which an effect pays; holds false naming down over the whole catalogue
-TWIN_MARGIN = 6.0  # of BIC, odds of 20 to 1: explanations closer than this cannot be told apart
+TWIN_MARGIN = 8.0  # of BIC, odds of 50 to 1: explanations closer than this cannot be told apart
 LARGEST_CLASS = 3  # a longer list of alternatives helps nobody
 BEAM = 4  # single effects carried on
 FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
@@ -56,7 +57,7 @@ class Search:
             grown = self._grown(beam, size)
             best_before = min(e.bic for e in beam)
             beam = self._parents(grown)[: BEAM if size == 1 else NARROW]
-            if not beam or beam[0].bic > best_before - NAMING_MARGIN:
+            if not beam or beam[0].bic > best_before - self._margin(beam[0]):
                 break
         return self._settled()
 
@@ -67,7 +68,11 @@ class Search:
             for names, explanation in self.tried.items()
             if len(names) == len(best.names) and best.names - names == {name} and FREE_TRIM.name not in names
         }
-        close = {other: lag for other, lag in others.items() if lag < TWIN_MARGIN}
+        close = {
+            other: lag
+            for other, lag in others.items()
+            if lag < TWIN_MARGIN * correlation_factor(best.fit.whitened)
+        }
         return sorted(close, key=lambda other: close[other])[: LARGEST_CLASS - 1]
 
     def without(self, best: Explanation, name: str) -> Explanation:
@@ -85,6 +90,10 @@ class Search:
             [("gain", (parent, name, self._values(name), is_thorough)) for name in others]
         )
         return dict(zip(others, found, strict=True))
+
+    def _margin(self, explanation: Explanation) -> float:
+        """What a member must gain beside this set: correlated residuals repeat each other's evidence."""
+        return NAMING_MARGIN * correlation_factor(explanation.fit.whitened)
 
     def _parents(self, grown: list[Explanation]) -> list[Explanation]:
         """The best sets, as far as they explain a fair part of what the very best does."""
@@ -145,7 +154,7 @@ class Search:
                 self._remember(e) for e in self.workers.results([("shrunk", (best, m)) for m in members])
             ]
             leanest = min(fewer, key=lambda e: e.bic)
-            if leanest.bic < best.bic + NAMING_MARGIN:
+            if leanest.bic < best.bic + self._margin(best):
                 best = leanest
                 continue
             rival = self._exchanged(best, fewer)
@@ -168,7 +177,7 @@ class Search:
             tasks = [("retrimmed", (e, way)) for e in polished for way in ways]
             explained += [self._remember(e) for e in self.workers.results(tasks)]
             best = min(explained, key=lambda e: e.bic)
-            if best.bic < leading.bic + NAMING_MARGIN:
+            if best.bic < leading.bic + self._margin(leading):
                 break
         return best
 
