@@ -51,8 +51,13 @@ def library(recordings: list[Recording], parameters: Array) -> list[Manoeuvre]:
         twice = np.concatenate([once, -once])
         return np.asarray(centre + size * np.tile(twice, -(-rows // twice.size))[:rows])
 
-    large, half, small = (f"{share * np.degrees(size):.1f} deg" for share in (1.0, 0.5, 0.3))
-    about = f" about {np.degrees(centre):.1f} deg" if abs(centre) > 0.02 * size else ""
+    has_angle = recordings[0].has_angle
+
+    def angle(value: float) -> str:
+        return f"{np.degrees(value):.1f} deg" if has_angle else f"{value:.3g} as recorded"
+
+    large, half, small = angle(size), angle(0.5 * size), angle(0.3 * size)
+    about = f" about {angle(centre)}" if abs(centre) > 0.02 * size else ""
     side = 2.0 * unit
     rest = (0.0, max(unit, 0.5 * settling))
     growing = [piece for share in (0.25, 0.5, 0.75, 1.0) for piece in _doublet(share, side, rest)]

@@ -80,7 +80,7 @@ def _separation(found: Diagnosis, name: str, twin: str, rival: Explanation) -> S
         effect=name,
         twin=twin,
         manoeuvre=None,
-        sentence=BY_NAME[name].manoeuvre,
+        sentence=f"to tell {_title(name)} from {_title(twin)}: {BY_NAME[name].manoeuvre}",
         predicted=float("nan"),
         confirmed=float("nan"),
         difference=np.empty((2, 0)),
