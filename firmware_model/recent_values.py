@@ -41,10 +41,11 @@ class RecentValues:
         if self._count < size:
             self._count += 1
 
-    def newest_belongs(self, std: float) -> bool:
+    def newest_belongs(self, std: float, is_strict: bool = False) -> bool:
         """Whether there are `size` values and the newest lies where most do.
 
-        std  of the sensor's noise: values that lie on a line by chance do not make a narrower one
+        std        of the sensor's noise: values that lie on a line by chance do not make a narrower one
+        is_strict  no if most are themselves further off than noise takes them: motion, or spikes upon spikes
         """
         size = len(self._values)
         if self._count < size:
@@ -60,4 +61,6 @@ class RecentValues:
                 distances.sort()
                 if distances[self._majority] < least:
                     least, off = distances[self._majority], newest
+        if is_strict:
+            return max(off, least) <= NOISE_GATE * std
         return off <= max(GATE * self._spread * least, NOISE_GATE * std)

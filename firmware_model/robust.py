@@ -218,7 +218,7 @@ class RobustEstimator:
             return Status.UPDATED
         self._outliers[sensor] += 1
         is_brief = self._outliers[sensor] <= self.config.outlier_limit
-        if is_brief or not sensor.has_settled or not self._budget.take():
+        if is_brief or not sensor.has_settled(self._outliers[sensor]) or not self._budget.take():
             return Status.REFUSED_OUTLIER
         self._outliers[sensor] = 0
         if sensor is self._filter.pitch:

@@ -8,8 +8,12 @@ from firmware_model.ud_factors import UdFactors
 
 HUBER = 3.0
 """Standard deviations beyond which a sample's influence does not grow any more."""
+STATE_GATE = 5.0
+"""Standard deviations of the state by which a value may be off."""
 OPENING = 5
 """Values that must agree before a sensor is followed, and values after that which must agree with them."""
+PATIENCE = 15
+"""Values in which to agree as closely as noise allows; then some scatter is taken for motion."""
 
 
 class Sensor:
@@ -30,6 +34,7 @@ class Sensor:
         """The next value is the first."""
         self.is_started = False
         self._opening = OPENING
+        self._waited = 0
         self.force.forget()
 
     def clear(self) -> None:
@@ -47,12 +52,13 @@ class Sensor:
             return True
         if self.is_started:
             self._opening -= 1
-        return self.has_settled
+            return self._recent.newest_belongs(math.sqrt(self.noise.variance))
+        self._waited += 1
+        return self.has_settled(self._waited)
 
-    @property
-    def has_settled(self) -> bool:
-        """Whether the newest value is where most of the last ones are."""
-        return self._recent.newest_belongs(math.sqrt(self.noise.variance))
+    def has_settled(self, waited: int) -> bool:
+        """Whether the newest of `waited` values lies where most of the last ones do: a start may be made."""
+        return self._recent.newest_belongs(math.sqrt(self.noise.variance), is_strict=waited <= PATIENCE)
 
     def reset(self) -> None:
         """Forgets the noise too."""
@@ -62,12 +68,18 @@ class Sensor:
         self.restart()
 
     def is_outlier(self, ud: UdFactors, value: float, gate: float) -> bool:
-        """Whether the value is more than `gate` standard deviations from where it is expected."""
+        """Whether the value is too far from where it is expected.
+
+        That is `gate` standard deviations of the sensor, and fewer of what is not known of the state: where
+        little is known, `gate` of them would let any spike pass.
+        """
         if not self.is_started:
             return False
         error = value - ud.x[self.entry]
-        variance = ud.covariance(self.entry, self.entry) + self.noise.variance
-        return not error * error <= gate * gate * max(variance, self._resolution * self._resolution)
+        unknown = min(gate, STATE_GATE)
+        least = max(self.noise.variance, self._resolution * self._resolution)
+        limit = gate * gate * least + unknown * unknown * ud.covariance(self.entry, self.entry)
+        return not error * error <= limit
 
     def learn(self, ud: UdFactors, value: float, p: int) -> float:
         """One update with 1/p of the value's information; gives the noise variance that it was given.

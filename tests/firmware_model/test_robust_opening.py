@@ -11,6 +11,7 @@ from linear_dive import dive
 from robust_estimator import CONFIG, assert_found, estimator_of, run
 
 from firmware_model import RobustEstimator, Status
+from firmware_model.propagation import THETA
 from firmware_model.recent_values import RecentValues
 from firmware_model.sensor import OPENING
 
@@ -50,6 +51,13 @@ def test_noise_is_no_spike_and_too_few_values_say_nothing():
     assert np.mean(belongs[4:]) > 0.97
     recent.clear()
     assert not recent.newest_belongs(NOISE)
+
+
+def test_scatter_is_motion_or_spikes_upon_spikes():
+    """Three spikes of five: the two left, and one that happens to lie near, are no start to be sure of."""
+    recent = filled([0.313, -0.213, -0.003, -0.002, 0.353])
+    assert recent.newest_belongs(0.003)
+    assert not recent.newest_belongs(0.003, is_strict=True)
 
 
 @pytest.mark.parametrize("value", [1e300, -1.7e308])
@@ -97,3 +105,19 @@ def test_another_datum_is_not_believed_from_a_spike_on(trained):
     assert set(statuses[:start]) == {Status.REFUSED_OUTLIER}
     assert set(statuses[start + 1 :]) == {Status.UPDATED}
     assert_found(estimator)
+
+
+def test_what_is_not_known_of_the_state_lets_no_spike_pass():
+    """After a second without pitch, 8 deviations off is well within the gate of 20 that the sensor has."""
+    samples = dive(700, 4)
+    blind, spiked = RobustEstimator(CONFIG), RobustEstimator(CONFIG)
+    hidden = [replace(s, pitch=math.nan) if 60 <= k < 72 else s for k, s in enumerate(samples)]
+    run(blind, hidden[:72])
+    run(spiked, hidden[:71])
+    spread = math.sqrt(spiked._filter.ud.covariance(THETA, THETA))
+    assert spread > 5.0 * math.sqrt(spiked._filter.pitch.noise.variance)
+    assert (
+        spiked.update(replace(hidden[71], pitch=samples[71].pitch + 8.0 * spread)) is Status.REFUSED_OUTLIER
+    )
+    assert run(spiked, hidden[72:]) == run(blind, hidden[72:])
+    assert spiked.estimate().values == blind.estimate().values
