@@ -96,6 +96,7 @@ def proof_picture(answer: Answer) -> str:
         axis.bar_label(bars, labels=[f"{error:.3g}" for error in errors[::-1]], padding=3)
         axis.axvline(noise, color="#444444", linestyle="--", linewidth=1.0)
         axis.set_xlim(0.0, 1.18 * max(*errors, noise))
+        axis.locator_params(axis="x", nbins=5)
         axis.set_xlabel(f"{label} (dashed: sensor noise)")
         axis.grid(axis="y", visible=False)
         axis.set_axisbelow(True)
