@@ -138,7 +138,13 @@ def output_error(
     if not np.isfinite(cost) or not all(np.abs(S).max() < RUNAWAY for _, S in parts):
         # A start from which the model runs away: nothing can be improved from here.
         return finished(
-            point.with_noise(np.ones(4)), [(0 * e, 0 * S) for e, S in parts], inputs, free, -np.inf, 0, False
+            point.with_noise(np.ones(4)),
+            [(np.zeros_like(e), np.zeros_like(S)) for e, S in parts],
+            inputs,
+            free,
+            -np.inf,
+            0,
+            False,
         )
     while not converged and iterations < most_iterations:
         iterations += 1

@@ -23,6 +23,7 @@ from host.uncertainty import covariance
 from host.wave_forces import wave_forces
 
 Verdict = Literal["no_mismatch", "explained", "partly_explained", "unexplained"]
+WORSE = 2.0  # chi2 of held-out spans from which on an explanation must at least better the base there
 WAVES = "surface_waves"
 WAVE_PERIODS = (2.0, 20.0)  # s
 SLOTS: tuple[Slot, ...] = ("heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment")
@@ -180,8 +181,10 @@ def _refitted(explanation: Explanation, recordings: list[Recording]) -> Explanat
 
 
 def _verdict(best: Explanation, left: Leftover, before: Misfit, after: Misfit) -> Verdict:
-    if left.is_nothing:
-        return "explained" if best.names else "no_mismatch"
+    if left.is_nothing and not best.names:
+        return "no_mismatch"
+    if left.is_nothing and after.chi2 < max(before.chi2, WORSE):
+        return "explained"
     return "partly_explained" if best.names and after.chi2 < 0.7 * before.chi2 else "unexplained"
 
 
@@ -229,11 +232,14 @@ def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfi
     size = max(after.chi2_depth, after.chi2_pitch) ** 0.5
     if left.is_smooth:
         kind = "it depends on the motion, so it is physics and no sea, but none that is known here"
+    elif left.is_nothing:
+        kind = "what was learnt does not hold on the stretches that were held out"
     elif left.is_no_sea:
         kind = "it acts like noise, but too weakly for a sea: physics left out that comes and goes"
     elif left.is_coloured:
         kind = "it does not follow the motion: a disturbance with a rhythm or a drift of its own"
     else:
         kind = "it is as rough as sensor noise, but larger than these sensors show elsewhere"
-    begin = "Most is explained, but" if best.names else "None of the physics in the catalogue explains this:"
+    is_part = verdict == "partly_explained"
+    begin = "Most is explained, but" if is_part else "None of the physics in the catalogue explains this:"
     return f"{begin} {worst} is still off by {size:.1f} times its sensor noise in a free run; {kind}." + sea
