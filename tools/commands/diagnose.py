@@ -84,7 +84,8 @@ def run(args: argparse.Namespace) -> int:
         twins = f"  (or {', '.join(map(title, effect.twins))})" if effect.twins else ""
         print(f"  {effect.name}{twins}")
         for name, (value, std, unit) in effect.coefficients.items():
-            print(f"    {name:20s} {value:+.5g} +- {std:.2g} {unit}")
+            if std > 0.0:  # else it was measured, not estimated
+                print(f"    {name:20s} {value:+.5g} +- {std:.2g} {unit}")
         for separation in answer.separating(effect.name):
             print(f"    {separation.sentence}")
     print(f"  {found.remaining}")
