@@ -271,7 +271,7 @@ class Fitter:
         names = frozenset(effect.name for effect in structure.effects)
         inputs, free = self.inputs(names), self.free(names)
         if starts[0].noise[2:].any():
-            return max(map(self._carried_on, starts[:1]), key=lambda fit: fit.log_likelihood)
+            return self._carried_on(starts[0])
         fits = [output_error(start, inputs, free, FIRST_ITERATIONS, TOLERANCE) for start in starts]
         best = max(fits, key=lambda fit: fit.log_likelihood)
         on = Point(structure, best.parameters, best.initial, best.noise)

@@ -83,9 +83,7 @@ class Search:
 
     def gains(self, parent: Explanation, is_thorough: bool = True) -> dict[str, float]:
         """Twice the log-likelihood each effect could gain on top of the parent, predicted."""
-        others = [effect.name for effect in CATALOGUE if effect.name not in parent.names]
-        if FREE_TRIM.name in parent.names:
-            others = [name for name in others if name not in OFFSETS]
+        others = _candidates(parent)
         found = self.workers.results(
             [("gain", (parent, name, self._values(name), is_thorough)) for name in others]
         )
@@ -121,9 +119,7 @@ class Search:
         against its own coefficients, would gain once all of them are free; so until little is left these
         are always tried.
         """
-        others = [effect.name for effect in CATALOGUE if effect.name not in parent.names]
-        if FREE_TRIM.name in parent.names:
-            others = [name for name in others if name not in OFFSETS]
+        others = _candidates(parent)
         if size == 1 and not self.root.fit.has_process_noise:
             return others
         gains = self.gains(parent, is_leading)
@@ -218,3 +214,9 @@ class Search:
         if known is None or explanation.bic < known.bic:
             self.tried[explanation.names] = explanation.lean()
         return self.tried[explanation.names]
+
+
+def _candidates(parent: Explanation) -> list[str]:
+    """What may join a set: the offsets only once the free trim, which does their work, has gone."""
+    barred = OFFSETS if FREE_TRIM.name in parent.names else ()
+    return [e.name for e in CATALOGUE if e.name not in parent.names and e.name not in barred]
