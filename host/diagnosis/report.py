@@ -130,12 +130,11 @@ def _effect(effect: NamedEffect, answer: Answer) -> dict[str, Any]:
             {
                 "name": name,
                 "value": f"{value:.4g}",
-                "interval": f"{value - 1.96 * std:.4g} to {value + 1.96 * std:.4g}"
-                if std > 0
-                else "measured",
+                "interval": f"{value - 1.96 * std:.4g} to {value + 1.96 * std:.4g}",
                 "unit": unit,
             }
             for name, (value, std, unit) in effect.coefficients.items()
+            if std > 0.0
         ],
         "delta_bic": f"{effect.delta_bic:.0f}",
         "gain": f"{100 * effect.heldout_gain:.0f} %" if effect.heldout_gain > 0.0 else "",
