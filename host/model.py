@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from host.catalogue import BY_NAME, structure_of
+from host.catalogue import BY_NAME, UNKNOWN, named, structure_of
 from host.equations import NAMES, PARAMETERS, Structure
 from host.errors import RecordingError
 from host.recording import Array, Recording
@@ -119,9 +119,9 @@ def write_model(model: VehicleModel, path: Path) -> None:
 
 def _check_effect(effect: Any, path: Path) -> None:
     name = effect.get("name") if isinstance(effect, dict) else effect
-    if name not in BY_NAME:
+    if name not in BY_NAME | UNKNOWN:
         raise RecordingError(f"{path}: holds an effect this version does not know ({name})")
-    for parameter in BY_NAME[name].parameters:
+    for parameter in named(name).parameters:
         entry = effect.get("parameters", {}).get(parameter.name)
         value = entry.get("value") if isinstance(entry, dict) else None
         if not isinstance(value, int | float) or not np.isfinite(value):

@@ -64,7 +64,7 @@ def heldout_errors(path: Path, names: tuple[str, ...], start: dict[str, float]) 
     again = output_error(point, fitter.inputs(told), fit.free)
     if again.log_likelihood > fit.log_likelihood:
         best = Explanation(told, again, fitter.bic(again, told))
-    return misfit(best, spans.judging or spans.teaching, noise_floor(recordings)).as_json()
+    return misfit(best, spans, noise_floor(recordings)).as_json()
 
 
 if __name__ == "__main__":

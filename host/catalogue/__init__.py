@@ -5,7 +5,7 @@ The names are a contract: reports, tests and users rely on them.
 
 import copyreg
 
-from host.catalogue import actuator, environment, heave, kinematics, nuisance, pitch, sensor, surge
+from host.catalogue import actuator, environment, heave, kinematics, nuisance, pitch, sensor, surge, unknown
 from host.equations import Effect, Structure
 
 CATALOGUE: tuple[Effect, ...] = (
@@ -18,13 +18,14 @@ CATALOGUE: tuple[Effect, ...] = (
     *environment.EFFECTS,
 )
 BY_NAME = {effect.name: effect for effect in CATALOGUE}
-_ALL = BY_NAME | {effect.name: effect for effect in (nuisance.FREE_TRIM, nuisance.ANY_SMOOTH_FORCE)}
+UNKNOWN = {effect.name: effect for effect in unknown.FORMS}
+_ALL = BY_NAME | UNKNOWN | {e.name: e for e in (nuisance.FREE_TRIM, unknown.ANY_SMOOTH_FORCE)}
 OFFSETS = ("net_buoyancy", "trim_moment", "rudder_offset", "pitch_bias", "vertical_current")
 """Effects that do no more than shift the steady state, as nuisance.FREE_TRIM does without saying why."""
 
 
 def named(name: str) -> Effect:
-    """The entry, or the nuisance, of that name."""
+    """The entry of that name, or the form of unknown physics. Raises KeyError where there is none."""
     return _ALL[name]
 
 
@@ -34,7 +35,7 @@ copyreg.pickle(Effect, lambda effect: (named, (effect.name,)))
 
 def structure_of(names: frozenset[str] | tuple[str, ...]) -> Structure:
     """The base equations with the named effects. Raises KeyError for a name that is not in the catalogue."""
-    unknown = [name for name in names if name not in _ALL]
-    if unknown:
-        raise KeyError(unknown[0])
+    foreign = [name for name in names if name not in _ALL]
+    if foreign:
+        raise KeyError(foreign[0])
     return Structure(tuple(effect for effect in _ALL.values() if effect.name in names))

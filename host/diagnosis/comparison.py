@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.stats import chi2
 
-from host.catalogue import BY_NAME
+from host.catalogue import named
 from host.diagnosis.fitter import Explanation, Fitter
 from host.diagnosis.search import NAMING_MARGIN
 from host.equations import NAMES, PARAMETERS
@@ -162,7 +162,7 @@ def _values(explanation: Explanation) -> dict[str, Value]:
 
 
 def _of(name: str, values: dict[str, Value]) -> dict[str, Value]:
-    return {parameter.name: values[parameter.name] for parameter in BY_NAME[name].parameters}
+    return {parameter.name: values[parameter.name] for parameter in named(name).parameters}
 
 
 def as_json(found: Comparison, given: str) -> dict[str, Any]:
@@ -170,7 +170,7 @@ def as_json(found: Comparison, given: str) -> dict[str, Any]:
     units = {p.name: p.unit for p in PARAMETERS}
 
     def values(side: dict[str, Value], name: str) -> dict[str, Any] | None:
-        unit = {p.name: p.unit for p in BY_NAME[name].parameters}
+        unit = {p.name: p.unit for p in named(name).parameters}
         return {k: {"value": v, "std": s, "unit": unit[k]} for k, (v, s) in side.items()} or None
 
     return {
@@ -202,7 +202,7 @@ def sentences(found: Comparison, given: str) -> list[str]:
     said = []
     for effect in found.effects:
         title = effect.name.replace("_", " ")
-        unit = {p.name: p.unit for p in BY_NAME[effect.name].parameters}
+        unit = {p.name: p.unit for p in named(effect.name).parameters}
         if effect.status == "missing":
             listed = ", ".join(_said(k, v, s, unit[k]) for k, (v, s) in effect.recorded.items())
             said.append(f"{title} is missing from the {given}: {listed}.")

@@ -6,15 +6,16 @@ from typing import Literal
 
 import numpy as np
 
-from host.catalogue import BY_NAME, CATALOGUE, OFFSETS
+from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, named
 from host.diagnosis.fitter import Explanation, Fitter
 from host.diagnosis.leftover import Leftover, leftover
 from host.diagnosis.locate import Location, locate
 from host.diagnosis.noise_floor import noise_floor
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.search import NAMING_MARGIN, Search
-from host.diagnosis.spans import divide
+from host.diagnosis.spans import Spans, divide
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
+from host.diagnosis.unknown_physics import known_in, unknown_in, with_unknown
 from host.diagnosis.workers import Workers
 from host.equations import NAMES, Slot
 from host.fit import Fit
@@ -24,6 +25,7 @@ from host.wave_forces import wave_forces
 
 Verdict = Literal["no_mismatch", "explained", "partly_explained", "unexplained"]
 WORSE = 2.0  # chi2 of held-out spans from which on an explanation must at least better the base there
+MOST_WORTH = 1e9  # of BIC: without some effects the equations run away
 WAVES = "surface_waves"
 WAVE_PERIODS = (2.0, 20.0)  # s
 SLOTS: tuple[Slot, ...] = ("heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment")
@@ -79,17 +81,19 @@ def diagnose(
         search = Search(fitter, workers, on_progress, fitter.base, fitter.trimmed())
         best = search.run()
         left = leftover(fitter, best)
+        if best.names or not left.is_nothing:
+            best = with_unknown(search, best)
+            left = leftover(fitter, best)
         if not left.is_nothing:
             search, best = _in_a_sea(search, best)
             best, rough = _among_waves(search, best)
             left = leftover(fitter, best, rough)
         on_progress("held-out check")
-        judging = spans.judging or spans.teaching
-        before, after = misfit(search.base, judging, floor), misfit(best, judging, floor)
-        effects = [_named(search, best, name, judging, floor, after) for name in best.names]
+        before, after = misfit(search.base, spans, floor), misfit(best, spans, floor)
+        effects = [_named(search, best, name, spans, floor, after) for name in known_in(best)]
         effects.sort(key=lambda effect: -effect.delta_bic)
         verdict = _verdict(best, left, before, after)
-        slots = _slots(search, best, effects, verdict)
+        slots = _slots(search, best, verdict)
     has_sea = best.fit.has_process_noise
     on_progress("final fit on everything")
     base, extended = _refitted(search.base, recordings), _refitted(best, recordings)
@@ -151,14 +155,14 @@ def _among_waves(search: Search, best: Explanation) -> tuple[Explanation, Fit | 
 
 
 def _named(
-    search: Search, best: Explanation, name: str, judging: list[Recording], floor: Array, after: Misfit
+    search: Search, best: Explanation, name: str, spans: Spans, floor: Array, after: Misfit
 ) -> NamedEffect:
     without = search.without(best, name)
     return NamedEffect(
         name=name,
         coefficients={},
         delta_bic=without.bic - best.bic,
-        heldout_gain=1.0 - after.chi2 / misfit(without, judging, floor).chi2,
+        heldout_gain=1.0 - after.chi2 / misfit(without, spans, floor).chi2,
         twins=search.twins(best, name),
     )
 
@@ -183,19 +187,18 @@ def _refitted(explanation: Explanation, recordings: list[Recording]) -> Explanat
 def _verdict(best: Explanation, left: Leftover, before: Misfit, after: Misfit) -> Verdict:
     if left.is_nothing and not best.names:
         return "no_mismatch"
-    if left.is_nothing and after.chi2 < max(before.chi2, WORSE):
+    if left.is_nothing and after.chi2 < max(before.chi2, WORSE) and not unknown_in(best):
         return "explained"
-    return "partly_explained" if best.names and after.chi2 < 0.7 * before.chi2 else "unexplained"
+    return "partly_explained" if known_in(best) and after.chi2 < 0.7 * before.chi2 else "unexplained"
 
 
-def _slots(
-    search: Search, best: Explanation, effects: list[NamedEffect], verdict: Verdict
-) -> dict[Slot, float]:
-    """Shares that add up to 1: of the evidence of what was named, else of what each slot could gain."""
+def _slots(search: Search, best: Explanation, verdict: Verdict) -> dict[Slot, float]:
+    """Shares that add up to 1: of the evidence of what was found, else of what each slot could gain."""
     shares: dict[Slot, float] = dict.fromkeys(SLOTS, 0.0)
-    if effects:
-        for effect in effects:
-            shares[BY_NAME[effect.name].slot] += max(effect.delta_bic, 0.0)
+    if best.names:
+        for name in best.names:
+            worth = search.without(best, name).bic - best.bic
+            shares[named(name).slot] += float(np.clip(worth, 0.0, MOST_WORTH))
     elif verdict != "no_mismatch":
         for name, gain in search.gains(best).items():
             slot = BY_NAME[name].slot
@@ -228,6 +231,8 @@ def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfi
         return "Nothing is missing from the base model on this recording." + sea
     if verdict == "explained":
         return "What is left is as small as the sensors' own noise." if not sea else sea.strip()
+    if unknown_in(best) and left.is_nothing:
+        return f"Physics is at work that the catalogue does not hold. {' '.join(unknown_in(best))}" + sea
     worst = "depth" if after.chi2_depth > after.chi2_pitch else "pitch"
     size = max(after.chi2_depth, after.chi2_pitch) ** 0.5
     if left.is_smooth:

@@ -7,6 +7,7 @@ import numpy as np
 
 from host.catalogue import named, structure_of
 from host.catalogue.nuisance import FREE_TRIM
+from host.catalogue.unknown import ANY_SMOOTH_FORCE, FORMS, SPANS
 from host.diagnosis.first_guess import accelerations, first_guess
 from host.diagnosis.noise_floor import noise_floor
 from host.equations import NAMES, Effect
@@ -54,6 +55,7 @@ class Fitter:
             self.held["u0"] = float(np.mean([r.speed.mean() for r in recordings]))
             # Where the speed is measured its loss is data, and there is nothing in it to estimate.
             self.held |= {name: 0.0 for name in ("c_ud", "c_uq")} | {"speed_time": 1.0}
+        self.held |= dict.fromkeys(SPANS.values(), max(float(r.time[-1]) for r in recordings))
         self._longest_substep = LONGEST_SUBSTEP
         self._inputs: dict[Names, list[Inputs]] = {}
         self.base = self._base() if known is None else known
@@ -141,6 +143,33 @@ class Fitter:
         probed = self._probed(parent, named(name), values, is_thorough or not values)
         return max(gain for gain, _ in probed)
 
+    def form_gains(self, parent: Explanation) -> dict[str, float]:
+        """What each form of unknown physics could take off the BIC on top of the parent, predicted.
+
+        Those of the motion share the sensitivities of one propagation with all of them at zero.
+        """
+        names = parent.names | {ANY_SMOOTH_FORCE.name}
+        structure, inputs = structure_of(names), self.inputs(names)
+        point = self._point(names, parent, ANY_SMOOTH_FORCE.name, np.zeros(len(ANY_SMOOTH_FORCE.parameters)))
+        white, cost = self._whitened(point, inputs, parent)
+        own = {parameter.name for parameter in ANY_SMOOTH_FORCE.parameters}
+        free = self.free(names) & np.array([name not in own for name in structure.names])
+        before, charge = _squares(parent), log(parent.fit.samples)
+        gains = {}
+        for form in FORMS:
+            if form.name in parent.names:
+                continue
+            if form.parameters[0].name in own:
+                with_it = free | np.array([name == form.parameters[0].name for name in structure.names])
+                left = (
+                    GaussNewton(white, point, with_it).predicted_cost(cost) if np.isfinite(cost) else np.inf
+                )
+                gain = before - left
+            else:
+                gain = self.gain(parent, form.name, [], is_thorough=True)
+            gains[form.name] = gain - charge * self.free_parameters(frozenset({form.name}))
+        return gains
+
     def shrunk(self, parent: Explanation, name: str) -> Explanation:
         """The parent's set without one of its effects."""
         names = parent.names - {name}
@@ -202,18 +231,23 @@ class Fitter:
         """Predicted gain and start values of an effect, for each of its probes."""
         names = parent.names | {effect.name}
         inputs, free = self.inputs(names), self.free(names)
-        before = sum(float(np.nansum(e**2)) for e in parent.fit.whitened)
-        has_sea = parent.fit.has_process_noise
+        before = _squares(parent)
         probed = []
         for probe in [*values, *(self._probes(effect, parent) if is_thorough else [])]:
             point = self._point(names, parent, effect.name, probe)
-            with np.errstate(over="ignore", invalid="ignore"):
-                white = (whitened_innovations if has_sea else residuals_at)(point, inputs)
-                runs_away = not all(np.abs(S).max() < RUNAWAY for _, S in white)
-                cost = sum(float(np.sum(e**2)) for e, _ in white)
-            left = np.inf if runs_away else GaussNewton(white, point, free).predicted_cost(cost)
+            white, cost = self._whitened(point, inputs, parent)
+            left = GaussNewton(white, point, free).predicted_cost(cost) if np.isfinite(cost) else np.inf
             probed.append((before - left, probe))
         return probed
+
+    def _whitened(
+        self, point: Point, inputs: list[Inputs], parent: Explanation
+    ) -> tuple[list[tuple[Array, Array]], float]:
+        """Innovations and sensitivities under the parent's noise, and their sum of squares: inf if lost."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            white = (whitened_innovations if parent.fit.has_process_noise else residuals_at)(point, inputs)
+            runs_away = not all(np.abs(S).max() < RUNAWAY for _, S in white)
+            return white, np.inf if runs_away else sum(float(np.sum(e**2)) for e, _ in white)
 
     def _probes(self, effect: Effect, parent: Explanation) -> list[Array]:
         scales = np.array([self._scales[scale] for scale in effect.scales or ("",) * len(effect.parameters)])
@@ -226,14 +260,14 @@ class Fitter:
         return probes
 
     def _periods(self, limits: tuple[float, float], fit: Fit) -> list[float]:
-        """The strongest periods in the depth residuals of the longest recording, s."""
+        """The strongest periods in what the longest recording leaves, pitch and depth together, s."""
         longest = max(range(len(self.recordings)), key=lambda k: self.recordings[k].duration)
-        step, residual = self.recordings[longest].step, fit.whitened[longest][1]
-        filled = np.where(np.isfinite(residual), residual - np.nanmean(residual), 0.0)
-        rows = 4 * filled.size  # padded fourfold, as phases drift over the whole span
+        step, residual = self.recordings[longest].step, fit.whitened[longest]
+        filled = np.where(np.isfinite(residual), residual - np.nanmean(residual, axis=1, keepdims=True), 0.0)
+        rows = 4 * filled.shape[1]  # padded fourfold, as phases drift over the whole span
         frequencies = np.fft.rfftfreq(rows, step)[1:]
-        size = np.abs(np.fft.rfft(filled, rows))[1:]
-        span = step * filled.size
+        size = np.linalg.norm(np.fft.rfft(filled, rows), axis=0)[1:]
+        span = step * filled.shape[1]
         inside = (frequencies >= 1.0 / min(limits[1], 1.5 * span)) & (frequencies <= 1.0 / limits[0])
         # What is slower than the recording is long has no line of its own, and the base bends to it.
         periods = [share * span for share in (0.3, 0.7) if limits[0] < share * span < limits[1]]
@@ -283,6 +317,10 @@ class Fitter:
         if start.noise[2:].any():
             return filter_error_from(start, inputs, free)
         return output_error(start, inputs, free)
+
+
+def _squares(explanation: Explanation) -> float:
+    return sum(float(np.nansum(e**2)) for e in explanation.fit.whitened)
 
 
 def _first(values: Array) -> float:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.catalogue import BY_NAME
+from host.catalogue import BY_NAME, named
 from host.diagnosis.answer import Against, Answer
 from host.diagnosis.comparison import Comparison, EffectDifference, Side, compare
 from host.diagnosis.diagnose import SLOTS, Diagnosis, NamedEffect
@@ -37,7 +37,7 @@ def against_model(found: Diagnosis, model: VehicleModel, name: str) -> Answer:
     fitter = Fitter(recordings, known=found.extended)
     comparison = compare(fitter, found.extended, _side(model))
     known = {effect.name: effect for effect in found.effects}
-    effects = [_named(one, known) for one in comparison.named("missing", "different")]
+    effects = [_named(one, known) for one in comparison.named("missing", "different") if one.name in BY_NAME]
     longest = max(recordings, key=lambda recording: recording.duration)
     errors = free_run_errors(base, longest)
     verdict = found.verdict
@@ -47,7 +47,8 @@ def against_model(found: Diagnosis, model: VehicleModel, name: str) -> Answer:
         found,
         verdict=verdict,
         base=base,
-        base_misfit=misfit(base, divide(recordings).judging or recordings, found.floor),
+        # A model that knew none of the recording starts anew with each stretch.
+        base_misfit=misfit(base, replace(divide(recordings), unseen=[]), found.floor),
         effects=effects,
         slots=_slots(comparison) or found.slots,
         location=locate(longest, errors, found.floor, model.values["u0"]),
@@ -94,7 +95,7 @@ def _deviation(std: float | None) -> float:
 
 def _named(one: EffectDifference, known: dict[str, NamedEffect]) -> NamedEffect:
     before = known.get(one.name)
-    units = {p.name: p.unit for p in BY_NAME[one.name].parameters}
+    units = {p.name: p.unit for p in named(one.name).parameters}
     return NamedEffect(
         name=one.name,
         coefficients={name: (value, std, units[name]) for name, (value, std) in one.recorded.items()},
@@ -108,7 +109,7 @@ def _slots(comparison: Comparison) -> dict[Slot, float]:
     """Shares of the evidence, of effects and base coefficients together; empty where nothing differs."""
     shares: dict[Slot, float] = dict.fromkeys(SLOTS, 0.0)
     for effect in comparison.named("missing", "different", "superfluous"):
-        shares[BY_NAME[effect.name].slot] += min(max(effect.evidence, 0.0), 1e9)
+        shares[named(effect.name).slot] += min(max(effect.evidence, 0.0), 1e9)
     for parameter in comparison.parameters:
         if parameter.is_different:
             shares[SLOT_OF[parameter.name]] += min(parameter.deviations**2, 1e9)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.stats import chi2
 
-from host.catalogue import BY_NAME
+from host.catalogue import named
 from host.diagnosis.answer import Against, Answer
 from host.diagnosis.comparison import SIGNIFICANCE, compare, side_of
 from host.diagnosis.diagnose import Diagnosis, diagnose
@@ -79,7 +79,7 @@ def _with_ours(fitter: Fitter, contained: Explanation, ours: Explanation) -> Exp
     contained = fitter.polished(contained)
     for name in sorted(ours.names - contained.names):
         values = dict(zip(ours.fit.structure.names, ours.fit.parameters, strict=True))
-        start = np.array([values[parameter.name] for parameter in BY_NAME[name].parameters])
+        start = np.array([values[parameter.name] for parameter in named(name).parameters])
         grown = fitter.polished(fitter.grown(contained, name, [start]))
         gain = 2.0 * (grown.fit.log_likelihood - contained.fit.log_likelihood)
         if gain > chi2.isf(SIGNIFICANCE, start.size):

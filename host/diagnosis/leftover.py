@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import periodogram
 from scipy.stats import chi2
 
-from host.catalogue.nuisance import ANY_SMOOTH_FORCE
+from host.catalogue.unknown import ANY_SMOOTH_FORCE
 from host.diagnosis.fitter import Explanation, Fitter
 from host.diagnosis.noise_floor import is_quantised
 from host.equations import NAMES
@@ -21,7 +21,8 @@ SEA_DOUBT = 1.5  # no sea is as white and steady as the filter takes it to be
 GROUPS = 10
 LEAST_SEA = 0.003  # m/s; below it physics left out, not moving water, is what passes for noise
 MOVEMENT_SPAN = 0.5  # s
-FLOOR_DOUBT = 1.3  # times the noise floor, which is itself estimated
+FLOOR_DOUBT = 1.3  # times the noise floor, which no sensor keeps to exactly
+FLOOR_SPREAD = 14.0  # over the root of the samples: 4.5 relative deviations of the floor's own estimate
 ROUNDING_DOUBT = 2.0  # the same where rounding rules: noise adds to it and is hidden by it
 SLOW_SPREAD = 2.3  # of the cumulative periodogram (Kolmogorov's distribution at 5e-5)
 
@@ -60,7 +61,8 @@ def leftover(fitter: Fitter, best: Explanation, among_waves: Fit | None = None) 
     fit = best.fit if among_waves is None else among_waves
     rounded = is_quantised(fitter.recordings)
     tested = ~rounded
-    doubt = np.where(rounded, ROUNDING_DOUBT, FLOOR_DOUBT)
+    counts = np.sum([np.isfinite(e).sum(axis=1) for e in fit.whitened], axis=0)
+    doubt = np.where(rounded, ROUNDING_DOUBT, np.maximum(FLOOR_DOUBT, 1.0 + FLOOR_SPREAD / np.sqrt(counts)))
     innovations = [e[tested] for e in fit.whitened]
     gain = fitter.gain(best, ANY_SMOOTH_FORCE.name, [], is_thorough=True) / correlation_factor(fit.whitened)
     terms = len(ANY_SMOOTH_FORCE.parameters)

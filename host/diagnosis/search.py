@@ -10,14 +10,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
 
-from host.catalogue import BY_NAME, CATALOGUE, OFFSETS
+from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, named
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.fitter import Explanation, Fitter, Names
 from host.diagnosis.workers import Task, Workers
 from host.recording import Array
 from host.whiteness import correlation_factor
 
-NAMING_MARGIN = 10.0  # of BIC, beyond which an effect pays; holds false naming down over the whole catalogue
+NAMING_MARGIN = 6.0  # of BIC, beyond which an effect pays; holds false naming down over the whole catalogue
 TWIN_MARGIN = 8.0  # of BIC, odds of 50 to 1: explanations closer than this cannot be told apart
 LARGEST_CLASS = 3  # a longer list of alternatives helps nobody
 BEAM = 4  # single effects carried on
@@ -51,23 +51,24 @@ class Search:
     def run(self, also: list[Explanation] | None = None) -> Explanation:
         """The best explanation all of whose members pay for themselves; `also` are sets worth a look."""
         for explanation in (self.base, *(also or [])):
-            self._remember(explanation)
-        beam = [self._remember(self.root)]
+            self.remember(explanation)
+        beam = [self.remember(self.root)]
         for size in range(1, LARGEST_SET + 1):
             grown = self._grown(beam, size)
             best_before = min(e.bic for e in beam)
             beam = self._parents(grown)[: BEAM if size == 1 else NARROW]
-            if not beam or beam[0].bic > best_before - self._margin(beam[0]):
+            if not beam or beam[0].bic > best_before - self.margin(beam[0]):
                 break
         return self._settled()
 
     def twins(self, best: Explanation, name: str) -> list[str]:
         """The effects that would do the work of one member as well, or nearly: the two closest."""
-        others = {
+        exchanged = {
             next(iter(names - best.names)): explanation.bic - best.bic
             for names, explanation in self.tried.items()
-            if len(names) == len(best.names) and best.names - names == {name} and FREE_TRIM.name not in names
+            if len(names) == len(best.names) and best.names - names == {name}
         }
+        others = {other: lag for other, lag in exchanged.items() if other in BY_NAME}
         close = {
             other: lag
             for other, lag in others.items()
@@ -78,7 +79,7 @@ class Search:
     def without(self, best: Explanation, name: str) -> Explanation:
         """The set less one member."""
         if best.names - {name} not in self.tried:
-            self._remember(self.fitter.shrunk(best, name))
+            self.remember(self.fitter.shrunk(best, name))
         return self.tried[best.names - {name}]
 
     def gains(self, parent: Explanation, is_thorough: bool = True) -> dict[str, float]:
@@ -89,7 +90,24 @@ class Search:
         )
         return dict(zip(others, found, strict=True))
 
-    def _margin(self, explanation: Explanation) -> float:
+    def pruned(self, explanation: Explanation) -> Explanation:
+        """The set less the members that do not pay for themselves."""
+        while explanation.names:
+            tasks: list[Task] = [("shrunk", (explanation, member)) for member in sorted(explanation.names)]
+            leanest = min(map(self.remember, self.workers.results(tasks)), key=lambda e: e.bic)
+            if leanest.bic > explanation.bic + self.margin(explanation):
+                break
+            explanation = leanest
+        return explanation
+
+    def remember(self, explanation: Explanation) -> Explanation:
+        """Keeps the better of two fits of one set."""
+        known = self.tried.get(explanation.names)
+        if known is None or explanation.bic < known.bic:
+            self.tried[explanation.names] = explanation.lean()
+        return self.tried[explanation.names]
+
+    def margin(self, explanation: Explanation) -> float:
         """What a member must gain beside this set: correlated residuals repeat each other's evidence."""
         return NAMING_MARGIN * correlation_factor(explanation.fit.whitened)
 
@@ -110,7 +128,7 @@ class Search:
             self.on_progress(f"{size} effect{'s' * (size > 1)}, {number + 1}/{len(labels)}: {labels[number]}")
 
         found = self.workers.results(list(tasks.values()), say)
-        return [self._remember(explanation) for explanation in found]
+        return [self.remember(explanation) for explanation in found]
 
     def _promising(self, parent: Explanation, size: int, is_leading: bool) -> list[str]:
         """Effects to fit in earnest: all at first, later those predicted to gain most.
@@ -127,7 +145,7 @@ class Search:
         worth = {name for name in best if gains[name] > NAMING_MARGIN}
         is_far = size <= 2 and self.fitter.excess(parent.fit) > NEAR
         is_far &= not self.root.fit.has_process_noise
-        return [name for name in others if name in worth or (is_far and BY_NAME[name].is_common)]
+        return [name for name in others if name in worth or (is_far and named(name).is_common)]
 
     def _values(self, name: str) -> list[Array]:
         """Where a fit of this effect alone ended: a better start than its probes."""
@@ -135,7 +153,7 @@ class Search:
         if alone is None:
             return []
         fit = alone.fit
-        own = [fit.structure.names.index(p.name) for p in BY_NAME[name].parameters]
+        own = [fit.structure.names.index(p.name) for p in named(name).parameters]
         return [fit.parameters[own]]
 
     def _settled(self) -> Explanation:
@@ -143,17 +161,8 @@ class Search:
         self.on_progress("settling")
         best = self._retrimmed()
         for _ in range(MOST_ROUNDS):
-            if not best.names:
-                break
-            members = sorted(best.names)
-            fewer = [
-                self._remember(e) for e in self.workers.results([("shrunk", (best, m)) for m in members])
-            ]
-            leanest = min(fewer, key=lambda e: e.bic)
-            if leanest.bic < best.bic + self._margin(best):
-                best = leanest
-                continue
-            rival = self._exchanged(best, fewer)
+            best = self.pruned(best)
+            rival = self._exchanged(best, [self.without(best, member) for member in sorted(best.names)])
             if rival is None:
                 break
             best = rival
@@ -164,16 +173,16 @@ class Search:
         free = [e for e in self.tried.values() if FREE_TRIM.name in e.names]
         free = sorted((e for e in free if not self._has_idle_member(e)), key=lambda e: e.bic)
         rough = [e for e in free[: 2 * BEAM] if e.bic < free[0].bic + ROUGH]
-        polished = [self._remember(e) for e in self.workers.results([("polished", (e,)) for e in rough])]
+        polished = [self.remember(e) for e in self.workers.results([("polished", (e,)) for e in rough])]
         leading = min(polished, key=lambda e: e.bic)
         polished = [e for e in polished if e.bic < leading.bic + 2.0 * NAMING_MARGIN]
         explained = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
         for counts in ((0, 1), (2,)):
             ways = [frozenset(way) for count in counts for way in combinations(OFFSETS, count)]
             tasks = [("retrimmed", (e, way)) for e in polished for way in ways]
-            explained += [self._remember(e) for e in self.workers.results(tasks)]
+            explained += [self.remember(e) for e in self.workers.results(tasks)]
             best = min(explained, key=lambda e: e.bic)
-            if best.bic < leading.bic + self._margin(leading):
+            if best.bic < leading.bic + self.margin(leading):
                 break
         return best
 
@@ -196,9 +205,9 @@ class Search:
             rivals |= {name for name in gains if self._is_kin(name, member)}
             for name in sorted(rivals - best.names):
                 tasks[smaller.names | {name}] = ("grown", (smaller, name, self._values(name)))
-        grown = [self._remember(e) for e in self.workers.results(list(tasks.values()))]
+        grown = [self.remember(e) for e in self.workers.results(list(tasks.values()))]
         close = [e for e in grown if e.bic < best.bic + 4.0 * TWIN_MARGIN]
-        close = [self._remember(e) for e in self.workers.results([("polished", (e,)) for e in close])]
+        close = [self.remember(e) for e in self.workers.results([("polished", (e,)) for e in close])]
         rival = min(close, key=lambda e: e.bic, default=best)
         return rival if rival.bic < best.bic - 0.01 else None
 
@@ -206,14 +215,8 @@ class Search:
         """Of the same end of the chain and of some use alone: its gain may be misjudged by prediction."""
         alone = self.tried.get(self.root.names | {name})
         pays = alone is not None and alone.bic < self.root.bic - NAMING_MARGIN
-        slots = {BY_NAME[name].slot, BY_NAME[member].slot}
+        slots = {named(name).slot, named(member).slot}
         return pays and name != member and (len(slots) == 1 or slots == {"actuator", "sensor"})
-
-    def _remember(self, explanation: Explanation) -> Explanation:
-        known = self.tried.get(explanation.names)
-        if known is None or explanation.bic < known.bic:
-            self.tried[explanation.names] = explanation.lean()
-        return self.tried[explanation.names]
 
 
 def _candidates(parent: Explanation) -> list[str]:

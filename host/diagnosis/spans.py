@@ -1,6 +1,6 @@
 """Which parts of the recordings teach, and which only judge."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,10 +20,14 @@ class Spans:
 
     In the teaching recordings the judging spans are blank: the plane is known there, the measurements are
     not. So a free run passes through them, and what it learns before and after belongs to one motion.
+
+    unseen  row by row beside each teaching recording, what was blanked there: measured where that is not;
+            empty where recordings judge as a whole
     """
 
     teaching: list[Recording]
     judging: list[Recording]
+    unseen: list[Recording] = field(default_factory=list)
 
 
 def divide(recordings: list[Recording]) -> Spans:
@@ -37,6 +41,7 @@ def divide(recordings: list[Recording]) -> Spans:
         )
     teaching: list[Recording] = []
     judging: list[Recording] = []
+    unseen: list[Recording] = []
     for recording in recordings:
         kept = recording
         if recording.duration >= SHORTEST_DIVIDED:
@@ -47,8 +52,11 @@ def divide(recordings: list[Recording]) -> Spans:
                 if _is_measured(piece):
                     judging.append(piece)
                     kept = _blanked(kept, start, start + length)
-        teaching += [run for run in _runs(kept) if _is_measured(run)]
-    return Spans(teaching, judging)
+        for run, whole in zip(_runs(kept), _runs(recording), strict=True):
+            if _is_measured(run):
+                teaching.append(run)
+                unseen.append(_less(whole, run))
+    return Spans(teaching, judging, unseen if judging else [])
 
 
 def _is_measured(recording: Recording) -> bool:
@@ -63,6 +71,15 @@ def _blanked(recording: Recording, start: float, end: float) -> Recording:
         depth=np.where(inside, np.nan, recording.depth),
         pitch=np.where(inside, np.nan, recording.pitch),
         pitch_rate=np.where(inside, np.nan, recording.pitch_rate),
+    )
+
+
+def _less(whole: Recording, run: Recording) -> Recording:
+    """What the whole has measured and the run has not."""
+    return replace(
+        whole,
+        depth=np.where(np.isnan(run.depth), whole.depth, np.nan),
+        pitch=np.where(np.isnan(run.pitch), whole.pitch, np.nan),
     )
 
 

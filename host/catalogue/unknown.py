@@ -1,0 +1,153 @@
+"""Forces of which only the form is known: what is none of the catalogue's physics can still be described.
+
+None of these is an answer. Where one of them does better than the named effects it takes part with, physics
+is at work that the catalogue does not hold, however well some of its entries may imitate it together.
+"""
+
+from collections.abc import Callable
+from itertools import combinations_with_replacement
+from typing import Literal
+
+import casadi as ca
+
+from host.equations import Chain, Effect, Parameter
+
+Side = Literal["heave", "pitch"]
+SIDES: tuple[Side, Side] = ("heave", "pitch")
+KIND = {"heave": "force", "pitch": "moment"}
+RATE = {"heave": "w'", "pitch": "q'"}
+UNIT = {"heave": "m/s^2", "pitch": "rad/s^2"}
+MOTION = ("w", "q", "theta", "delta")
+DEGREE = 7  # of what wanders slowly: about as many turns as a tide or a leak takes in one recording
+SPANS = {side: f"wander_{side}_span" for side in SIDES}
+"""The parameters that hold the length of the recording, s, over which a force wanders."""
+
+Term = Callable[[tuple[ca.SX, ...]], ca.SX]
+
+
+def _product(*which: int) -> Term:
+    def term(motion: tuple[ca.SX, ...]) -> ca.SX:
+        value = motion[which[0]]
+        for i in which[1:]:
+            value = value * motion[i]
+        return value
+
+    return term
+
+
+def _modulus(which: int) -> Term:
+    return lambda motion: ca.fabs(motion[which])
+
+
+SHAPES: dict[str, Term] = {
+    f"{MOTION[i]}_{MOTION[j]}": _product(i, j) for i, j in combinations_with_replacement(range(4), 2)
+} | {f"abs_{name}": _modulus(i) for i, name in enumerate(MOTION)}
+"""Forms that change neither sign nor size with the motion as those of the catalogue do."""
+CUBES: dict[str, Term] = {f"{name}_cubed": _product(i, i, i) for i, name in enumerate(MOTION)}
+"""These are close to entries of the catalogue: a sign that something is left, but no form of their own."""
+
+
+def _push(side: Side, shape: str, term: Term) -> Callable[[Chain], None]:
+    def force(c: Chain) -> None:
+        value = c.p[f"{side}_{shape}"] * term((c.w, c.q, c.theta, c.plane)) * c.speed_ratio
+        setattr(c, side, getattr(c, side) + value)
+
+    return force
+
+
+def _share(side: Side, shape: str) -> Parameter:
+    return Parameter(name=f"{side}_{shape}", unit="SI", lower=-1e6, upper=1e6, meaning="share of the term")
+
+
+def _of_motion(side: Side, shape: str, term: Term) -> Effect:
+    words = shape.replace("abs_", "the size of ").replace("_", " times ")
+    return Effect(
+        name=f"unknown_{KIND[side]}_{shape}",
+        slot=side,
+        parameters=(_share(side, shape),),
+        sentence=f"A {KIND[side]} acts that goes with {words}, as nothing in the catalogue does.",
+        equation=f"{RATE[side]} = ... + {side}_{shape} {shape}",
+        manoeuvre="steps of several sizes and both signs",
+        probes=((0.0,),),
+        force=_push(side, shape, term),
+    )
+
+
+def _any_smooth_force(c: Chain) -> None:
+    for side in SIDES:
+        for shape, term in (SHAPES | CUBES).items():
+            _push(side, shape, term)(c)
+
+
+ANY_SMOOTH_FORCE = Effect(
+    name="any_smooth_force",
+    slot="heave",
+    parameters=tuple(_share(side, shape) for side in SIDES for shape in SHAPES | CUBES),
+    sentence="A force or moment that depends on the motion acts, and no entry of the catalogue is it.",
+    equation="w' = ... + P(w, q, theta, delta), q' = ... + R(w, q, theta, delta)",
+    manoeuvre="steps of several sizes and both signs",
+    probes=((0.0,) * (2 * len(SHAPES | CUBES)),),
+    force=_any_smooth_force,
+)
+"""Products of two, cubes and moduli of the motion, in heave and pitch: what is left by physics unknown to us
+shows as a gain of these, where random forces show none."""
+
+
+def _wandering(side: Side) -> Effect:
+    names = tuple(f"wander_{side}_{k}" for k in range(1, DEGREE + 1))
+
+    def force(c: Chain) -> None:
+        # Chebyshev polynomials of the time: T_k+1 = 2 x T_k - T_k-1.
+        x = 2 * c.time / c.p[SPANS[side]] - 1
+        before, now, value = ca.SX(1), x, ca.SX(0)
+        for name in names:
+            value += c.p[name] * now
+            before, now = now, 2 * x * now - before
+        setattr(c, side, getattr(c, side) + value)
+
+    limit = {"heave": 5.0, "pitch": 20.0}[side]
+    return Effect(
+        name=f"unknown_wandering_{KIND[side]}",
+        slot=side,
+        parameters=(
+            *(
+                Parameter(name=name, unit=UNIT[side], lower=-limit, upper=limit, meaning="of Chebyshev's")
+                for name in names
+            ),
+            Parameter(name=SPANS[side], unit="s", lower=1.0, upper=1e6, meaning="length of the recording"),
+        ),
+        sentence=f"A {KIND[side]} acts that wanders slowly with time, whatever the vehicle does.",
+        equation=f"{RATE[side]} = ... + sum of wander_{side}_k T_k(2 t/{SPANS[side]} - 1)",
+        manoeuvre="a straight level run as long as this one",
+        probes=((*((0.0,) * DEGREE), 1.0),),
+        scales=(*(("",) * DEGREE), "duration"),
+        force=force,
+    )
+
+
+def _swinging_moment(c: Chain) -> None:
+    phase = 2 * ca.pi * c.time / c.p["swing_period"]
+    c.pitch += c.p["swing_sine"] * ca.sin(phase) + c.p["swing_cosine"] * ca.cos(phase)
+
+
+SWINGING_MOMENT = Effect(
+    name="unknown_swinging_moment",
+    slot="pitch",
+    parameters=(
+        Parameter(name="swing_sine", unit="rad/s^2", lower=-20, upper=20, meaning="moment"),
+        Parameter(name="swing_cosine", unit="rad/s^2", lower=-20, upper=20, meaning="moment"),
+        Parameter(name="swing_period", unit="s", lower=2, upper=20000, meaning="period"),
+    ),
+    sentence="A moment acts that swings with a period of its own, and does not move the water.",
+    equation="q' = ... + swing_sine sin(2 pi t/T) + swing_cosine cos(2 pi t/T), T = swing_period",
+    manoeuvre="a straight level run of several periods with the planes fixed",
+    probes=((1e-3, 1e-3, 10.0),),
+    periods=(2.0, 20000.0),
+    force=_swinging_moment,
+)
+
+FORMS: tuple[Effect, ...] = (
+    *(_of_motion(side, shape, term) for side in SIDES for shape, term in SHAPES.items()),
+    *(_wandering(side) for side in SIDES),
+    SWINGING_MOMENT,
+)

@@ -1,0 +1,51 @@
+"""Whether something outside the catalogue does better than the entries that imitate it together.
+
+Few entries of a catalogue can follow nearly anything: drag and a current that cancels a buoyancy are the drag
+on one side of a keel. What gives them away is that one form of unknown physics (host.catalogue.unknown)
+explains the recording better, and with it some of them are no longer needed.
+"""
+
+from host.catalogue import BY_NAME, UNKNOWN
+from host.diagnosis.fitter import Explanation
+from host.diagnosis.search import NAMING_MARGIN, Search
+
+PROMISING = 2  # forms beside each set that are fitted in earnest
+FAIR_PART = 0.3  # of what a member was worth, that a form in its place must promise: predictions are local
+MOST_ROUNDS = 4
+
+
+def with_unknown(search: Search, best: Explanation) -> Explanation:
+    """The best explanation with forms of unknown physics in it, where they pay as named effects must."""
+    search.on_progress("physics outside the catalogue")
+    for _ in range(MOST_ROUNDS):
+        better = min(map(search.pruned, _grown(search, best)), key=lambda e: e.bic, default=best)
+        if better.bic > best.bic - search.margin(better):
+            break
+        best = better
+    return best
+
+
+def unknown_in(explanation: Explanation) -> list[str]:
+    """The sentences of the forms of unknown physics in a set."""
+    return [UNKNOWN[name].sentence for name in sorted(explanation.names & UNKNOWN.keys())]
+
+
+def known_in(explanation: Explanation) -> list[str]:
+    """The entries of the catalogue in a set."""
+    return [name for name in BY_NAME if name in explanation.names]
+
+
+def _grown(search: Search, best: Explanation) -> list[Explanation]:
+    """The set with a form more, beside all its members or in the place of one: the two best."""
+    parents = [best, *(search.without(best, name) for name in sorted(best.names))]
+    found = search.workers.results([("form_gains", (parent,)) for parent in parents])
+    chosen = {}
+    for parent, gains in zip(parents, found, strict=True):
+        # What a form gains where a member is gone must come near to what the member was worth.
+        least = max(NAMING_MARGIN, FAIR_PART * (parent.bic - best.bic))
+        likely = sorted((name for name in gains if gains[name] > least), key=lambda name: -gains[name])
+        for name in likely[:PROMISING]:
+            chosen[parent.names | {name}] = parent, name
+    grown = search.workers.results([("grown", (parent, name, [])) for parent, name in chosen.values()])
+    polished = search.workers.results([("polished", (e,)) for e in grown])
+    return [search.remember(e) for e in sorted(polished, key=lambda e: e.bic)[:2]]

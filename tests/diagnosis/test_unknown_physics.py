@@ -1,0 +1,64 @@
+"""Physics that no entry of the catalogue is must not pass for some of its entries."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from host.catalogue import BY_NAME, UNKNOWN, named, structure_of
+from host.catalogue.unknown import FORMS
+from host.diagnosis.diagnose import diagnose
+from host.diagnosis.files import write_extended_model
+from host.equations import Effect
+from host.model import read_model
+from host.predict import predict
+from host.vehicle import vehicle_from_table
+from tests.diagnosis.hidden_dive import hidden_dive
+
+
+@pytest.mark.long
+def test_drag_on_one_side_of_the_keel_is_none_of_the_catalogue() -> None:
+    """Quadratic drag with a current and a buoyancy that cancel would follow it nearly to the noise."""
+
+    def keel(_: float, x: np.ndarray, __: float) -> tuple[float, float, float]:  # type: ignore[type-arg]
+        return (-3.0 * x[0] ** 2 if x[0] > 0.0 else 0.0), 0.0, 0.0
+
+    found = diagnose([hidden_dive(keel, duration=100.0)])
+    assert found.verdict in ("partly_explained", "unexplained")
+    assert "unknown_force_w_w" in found.extended.names
+    assert {effect.name for effect in found.effects} <= {"heave_quadratic_drag"}
+    assert "catalogue does not hold" in found.remaining
+    assert found.slots["heave"] == max(found.slots.values())
+
+
+def test_a_mass_that_turns_is_unexplained_and_described(tmp_path: Path) -> None:
+    def turning(time: float, _: np.ndarray, __: float) -> tuple[float, float, float]:  # type: ignore[type-arg]
+        return 0.0, 0.08 * np.sin(2.0 * np.pi * time / 11.0), 0.0
+
+    dive = hidden_dive(turning, duration=100.0)
+    found = diagnose([dive])
+    assert found.verdict == "unexplained"
+    assert not found.effects
+    values = dict(zip(found.extended.fit.structure.names, found.extended.fit.parameters, strict=True))
+    assert values["swing_period"] == pytest.approx(11.0, rel=0.01)
+    assert np.hypot(values["swing_sine"], values["swing_cosine"]) == pytest.approx(0.08, rel=0.05)
+    assert "swings with a period" in found.remaining
+    # The model that is handed back includes it, and says so by name.
+    path = tmp_path / "extended_model.json"
+    write_extended_model(found, vehicle_from_table({"name": "auv", "speed": 2.5}, file="auv"), path)
+    model = read_model(path)
+    assert [effect["name"] for effect in model.effects] == ["unknown_swinging_moment"]
+    assert predict(model, dive).score.depth_rmse_m < 0.05
+
+
+@pytest.mark.parametrize("form", FORMS, ids=lambda form: form.name)
+def test_forms_are_described_and_are_no_entries(form: Effect) -> None:
+    assert form.name not in BY_NAME
+    assert named(form.name) is form is UNKNOWN[form.name]
+    assert form.sentence.endswith(".")
+    assert form.equation.startswith(("w' =", "q' ="))
+
+
+def test_all_forms_together_have_names_of_their_own() -> None:
+    names = structure_of(tuple(UNKNOWN)).names
+    assert len(set(names)) == len(names)
