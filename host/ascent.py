@@ -65,15 +65,21 @@ def place(point: Point, model: NoiseModel[P]) -> Place[P]:
     return Place(point, passes, likelihood if np.isfinite(likelihood) else -np.inf)
 
 
-def ascend(point: Point, model: NoiseModel[P], free: Mask, most_steps: int) -> tuple[Place[P], int, bool]:
-    """Climbs from a point; gives where it ended, after how many steps, and whether it had converged."""
+def ascend(
+    point: Point, model: NoiseModel[P], free: Mask, most_steps: int, holds_noise: bool = False
+) -> tuple[Place[P], int, bool]:
+    """Climbs from a point; gives where it ended, after how many steps, and whether it had converged.
+
+    holds_noise  whether the noise levels stay as they are, which saves most of the work
+    """
     here, damping, converged, used = place(point, model), 1e-3, False, 0
     while not converged and used < most_steps:
         used += 1
         step = GaussNewton(model.whitened(here.point, here.passes), here.point, free)
-        scoring = _Scoring(here, model)
+        scoring = None if holds_noise else _Scoring(here, model)
         while True:
-            there = place(step.trial(damping).with_noise(scoring.trial(damping)), model)
+            noise = here.point.noise if scoring is None else scoring.trial(damping)
+            there = place(step.trial(damping).with_noise(noise), model)
             if there.likelihood > here.likelihood or damping > 1e6:
                 break
             damping = max(damping * 10.0, 1e-3)

@@ -48,6 +48,13 @@ class Fit:
         return bool(self.noise[2:].any())
 
     @property
+    def levels(self) -> Array:
+        """What a fit that goes on from here starts with: `noise`; under waves (6,), see host.wave_forces."""
+        if not self.waves.any():
+            return self.noise
+        return np.concatenate([self.noise[:2], self.noise[2:] * self.waves[0] ** 4, self.waves])
+
+    @property
     def has_coloured_noise(self) -> bool:
         return bool(self.wander.any())
 

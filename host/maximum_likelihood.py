@@ -194,8 +194,7 @@ def residuals_at(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]
 
 
 def _innovations(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:
-    with np.errstate(over="ignore", invalid="ignore"):  # a start that runs away is infinite, and is given up
-        return [innovations(point.parameters, x0, one) for x0, one in zip(point.initial, inputs, strict=True)]
+    return [innovations(point.parameters, x0, one) for x0, one in zip(point.initial, inputs, strict=True)]
 
 
 def _whitened_by(noise: Array, parts: list[tuple[Array, Array]]) -> list[tuple[Array, Array]]:

@@ -266,6 +266,7 @@ def innovations(
     else:
         per_step = np.vstack([inputs.drive, inputs.measured, gains])
         table = over_rows(_sensitivities, form, rows)(carried, per_step, parameters)
-    error = inputs.present * (inputs.measured - table[:2])
-    sensitivity = table[2:].reshape((2, form.np + NX0, rows), order="F") * inputs.present[:, None, :]
+    with np.errstate(over="ignore", invalid="ignore"):  # a run that leaves the numbers is seen by its size
+        error = inputs.present * (inputs.measured - table[:2])
+        sensitivity = table[2:].reshape((2, form.np + NX0, rows), order="F") * inputs.present[:, None, :]
     return error, sensitivity

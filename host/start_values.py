@@ -16,6 +16,7 @@ from scipy.signal import lfilter
 from host.recording import Array, Recording
 
 LARGEST_FIT = 4000  # rows used per linear fit; more only cost time
+REST = 1e-3  # weight of an initial state of zero, in residuals: 1 mrad or 1 mm for a whole rad/s or m/s
 
 
 class _Stretch:
@@ -97,10 +98,18 @@ def _joint_fit(
     solution = np.linalg.lstsq(H / np.outer(scale, scale), g / scale, rcond=1e-12)[0] / scale
     cost = sum(float(np.sum((r - B @ solution) ** 2)) for B, r in projected)
     initial = [
-        np.linalg.lstsq(part, y - block @ solution, rcond=1e-10)[0]
+        _held_near_rest(part, y - block @ solution)
         for block, part, y in zip(shared, own, targets, strict=True)
     ]
     return solution, initial, cost
+
+
+def _held_near_rest(columns: Array, target: Array) -> Array:
+    """Least squares for an initial state; one that had died away before anything was measured stays zero."""
+    count = columns.shape[1]
+    weighted = np.vstack([columns, REST * np.eye(count)])
+    solution: Array = np.linalg.lstsq(weighted, np.concatenate([target, np.zeros(count)]), rcond=1e-10)[0]
+    return solution
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from host.ascent import ascend
 from host.equations import Chain, Effect, Parameter, Structure
 from host.filter_error import RandomForces
 from host.fit import Fit, finished
-from host.gauss_newton import Point
+from host.gauss_newton import Mask, Point
 from host.kalman import KalmanPass, kalman_pass
 from host.propagate import Inputs
 from host.recording import Array
@@ -94,28 +94,45 @@ class WaveForces(RandomForces):
 
 def wave_forces(start: Fit, inputs: list[Inputs], most_steps: int = 25) -> Fit:
     """Climbs from a fit with white forces to the likeliest parameters, noise and waves."""
-    structure = Structure((*start.structure.effects, *WAVES))
-    model = WaveForces([replace(one, structure=structure) for one in inputs])
     s, d = _busiest(start, inputs), FIRST_DAMPING
     densities = start.noise[2:] * 4.0 * d**2 * s**4
-    levels = np.clip([*start.noise[:2], *densities, s, d], model.least, model.most)
-    base = start.parameters.size
-    free = np.concatenate([start.free, [False, False]])
-    point = Point(structure, np.concatenate([start.parameters, levels[4:]]), start.initial, levels)
-    end, used, converged = ascend(point, model, free, most_steps)
-    white = model.whitened(end.point, end.passes)
+    levels = np.array([*start.noise[:2], *densities, s, d])
+    point = Point(start.structure, start.parameters, start.initial, levels)
+    return wave_forces_from(point, inputs, start.free, most_steps)
+
+
+def wave_forces_from(
+    point: Point, inputs: list[Inputs], free: Mask, most_steps: int = 25, holds_noise: bool = False
+) -> Fit:
+    """The same from any point with waves in its noise (6,); or the parameters alone, in these very waves."""
+    model, wider = _among(point, inputs)
+    end, used, converged = ascend(
+        wider, model, np.concatenate([free, [False, False]]), most_steps, holds_noise
+    )
+    white = _less_shape(model.whitened(end.point, end.passes), free.size)
     noise = end.point.noise
     # What is told as the force's density is that of slow motion, where the vehicle answers.
-    told = end.point.with_noise(np.concatenate([noise[:2], noise[2:4] / noise[4] ** 4]))
-    fit = finished(told, white, inputs, free, end.likelihood, used, converged)
-    return replace(
-        fit,
-        structure=start.structure,
-        parameters=fit.parameters[:base],
-        free=start.free,
-        information=fit.information[:base, :base],
-        waves=noise[4:],
-    )
+    told = np.concatenate([noise[:2], noise[2:4] / noise[4] ** 4])
+    here = Point(point.structure, end.point.parameters[: free.size], end.point.initial, told)
+    return replace(finished(here, white, inputs, free, end.likelihood, used, converged), waves=noise[4:])
+
+
+def whitened_among_waves(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:
+    """Innovations over their deviation (2, N) and their sensitivities, waves in the point's noise (6,)."""
+    model, wider = _among(point, inputs)
+    return _less_shape(model.whitened(wider, model.passes(wider)), point.parameters.size)
+
+
+def _among(point: Point, inputs: list[Inputs]) -> tuple[WaveForces, Point]:
+    structure = Structure((*point.structure.effects, *WAVES))
+    model = WaveForces([replace(one, structure=structure) for one in inputs])
+    levels = np.clip(point.noise, model.least, model.most)
+    return model, Point(structure, np.concatenate([point.parameters, levels[4:]]), point.initial, levels)
+
+
+def _less_shape(white: list[tuple[Array, Array]], count: int) -> list[tuple[Array, Array]]:
+    """Without the sensitivities by the waves' own two parameters, which follow those of the vehicle."""
+    return [(e, np.delete(S, [count, count + 1], axis=1)) for e, S in white]
 
 
 def _busiest(start: Fit, inputs: list[Inputs]) -> float:

@@ -6,28 +6,25 @@ from typing import Literal
 
 import numpy as np
 
-from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, named
+from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, UNKNOWN, named
 from host.diagnosis.fitter import Explanation, Fitter
-from host.diagnosis.leftover import Leftover, leftover
+from host.diagnosis.leftover import SEA_DOUBT, Leftover, leftover
 from host.diagnosis.locate import Location, locate
 from host.diagnosis.noise_floor import noise_floor
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
-from host.diagnosis.search import NAMING_MARGIN, Search
+from host.diagnosis.search import Search
+from host.diagnosis.seas import WAVES, among_waves, in_a_sea
 from host.diagnosis.spans import Spans, divide
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.unknown_physics import known_in, unknown_in, with_unknown
 from host.diagnosis.workers import Workers
 from host.equations import NAMES, Slot
-from host.fit import Fit
 from host.recording import Array, Recording
 from host.uncertainty import covariance
-from host.wave_forces import wave_forces
 
 Verdict = Literal["no_mismatch", "explained", "partly_explained", "unexplained"]
 WORSE = 2.0  # chi2 of held-out spans from which on an explanation must at least better the base there
 MOST_WORTH = 1e9  # of BIC: without some effects the equations run away
-WAVES = "surface_waves"
-WAVE_PERIODS = (2.0, 20.0)  # s
 SLOTS: tuple[Slot, ...] = ("heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment")
 
 
@@ -41,10 +38,10 @@ class NamedEffect:
     """
 
     name: str
-    coefficients: dict[str, tuple[float, float, str]]
     delta_bic: float
-    heldout_gain: float
-    twins: list[str]
+    heldout_gain: float = 0.0
+    coefficients: dict[str, tuple[float, float, str]] = field(default_factory=dict)
+    twins: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,19 +81,23 @@ def diagnose(
         if best.names or not left.is_nothing:
             best = with_unknown(search, best)
             left = leftover(fitter, best)
+        waves, model = None, best
         if not left.is_nothing:
-            search, best = _in_a_sea(search, best)
-            best, rough = _among_waves(search, best)
-            left = leftover(fitter, best, rough)
+            search, best = in_a_sea(search, best)
+            search, best, waves = among_waves(search, best)
+            left = leftover(fitter, best if waves is None else waves.fitted)
+            model = best if waves is None else waves.model
         on_progress("held-out check")
-        before, after = misfit(search.base, spans, floor), misfit(best, spans, floor)
+        before, after = misfit(search.base, spans, floor), misfit(model, spans, floor)
         effects = [_named(search, best, name, spans, floor, after) for name in known_in(best)]
+        if waves is not None:
+            effects.append(NamedEffect(name=WAVES, delta_bic=waves.delta_bic))
         effects.sort(key=lambda effect: -effect.delta_bic)
-        verdict = _verdict(best, left, before, after)
-        slots = _slots(search, best, verdict)
+        verdict = _verdict(model, left, before, after)
+        slots = _slots(search, best, effects, verdict)
     has_sea = best.fit.has_process_noise
     on_progress("final fit on everything")
-    base, extended = _refitted(search.base, recordings), _refitted(best, recordings)
+    base, extended = _refitted(search.base, recordings), _refitted(model, recordings)
     deviations = np.sqrt(np.diag(covariance(extended.fit)))
     std = dict(zip(extended.fit.structure.names, deviations.tolist(), strict=True))
     values = dict(zip(extended.fit.structure.names, extended.fit.parameters.tolist(), strict=True))
@@ -117,41 +118,10 @@ def diagnose(
         location=locate(longest, errors, floor, values["u0"]),
         force=unknown_force(longest, {n: values[n] for n in NAMES}, floor, fitter.accelerations),
         ranking=_ranking(search),
-        remaining=_remaining(verdict, best, left, after),
+        remaining=_remaining(verdict, model, left, after),
         has_sea=has_sea,
         std=std,
     )
-
-
-def _in_a_sea(calm: Search, best: Explanation) -> tuple[Search, Explanation]:
-    """The search again with random forces, where these explain more than any set of effects alone.
-
-    Each is charged for what it adds, so a set that leaves white noise needs no sea, and a sea needs no set.
-    """
-    fitter = calm.fitter
-    calm.on_progress("random forces")
-    root, also = fitter.with_sea(calm.root), fitter.with_sea(best)
-    if min(root.bic, also.bic) > best.bic - NAMING_MARGIN:
-        return calm, best
-    rough = Search(fitter, calm.workers, calm.on_progress, fitter.with_sea(calm.base), root)
-    found = rough.run([also])
-    return (rough, found) if found.bic < best.bic else (calm, best)
-
-
-def _among_waves(search: Search, best: Explanation) -> tuple[Explanation, Fit | None]:
-    """Names surface waves where random forces that swing with a wave's period beat white ones; and their fit.
-
-    The evidence is that of the swing; what the model gets is the regular wave nearest to it.
-    """
-    if not best.fit.has_process_noise or WAVES in best.names:
-        return best, None
-    search.on_progress("waves")
-    rough = wave_forces(best.fit, search.fitter.inputs(best.names))
-    bic, period = search.fitter.bic(rough, best.names), 2.0 * np.pi / rough.waves[0]
-    if bic > best.bic - NAMING_MARGIN or not WAVE_PERIODS[0] < period < WAVE_PERIODS[1]:
-        return best, None
-    regular = search.fitter.grown(best, WAVES, [np.array([0.01, 0.01, period])])
-    return Explanation(regular.names, regular.fit, min(regular.bic, bic)), rough
 
 
 def _named(
@@ -160,7 +130,6 @@ def _named(
     without = search.without(best, name)
     return NamedEffect(
         name=name,
-        coefficients={},
         delta_bic=without.bic - best.bic,
         heldout_gain=1.0 - after.chi2 / misfit(without, spans, floor).chi2,
         twins=search.twins(best, name),
@@ -187,17 +156,22 @@ def _refitted(explanation: Explanation, recordings: list[Recording]) -> Explanat
 def _verdict(best: Explanation, left: Leftover, before: Misfit, after: Misfit) -> Verdict:
     if left.is_nothing and not best.names:
         return "no_mismatch"
-    if left.is_nothing and after.chi2 < max(before.chi2, WORSE) and not unknown_in(best):
+    # Random forces spoil a free run whatever is known: it need not be better for knowing more.
+    worst = max(before.chi2 * (SEA_DOUBT if best.fit.has_process_noise else 1.0), WORSE)
+    if left.is_nothing and after.chi2 < worst and not unknown_in(best):
         return "explained"
     return "partly_explained" if known_in(best) and after.chi2 < 0.7 * before.chi2 else "unexplained"
 
 
-def _slots(search: Search, best: Explanation, verdict: Verdict) -> dict[Slot, float]:
+def _slots(
+    search: Search, best: Explanation, effects: list[NamedEffect], verdict: Verdict
+) -> dict[Slot, float]:
     """Shares that add up to 1: of the evidence of what was found, else of what each slot could gain."""
     shares: dict[Slot, float] = dict.fromkeys(SLOTS, 0.0)
-    if best.names:
-        for name in best.names:
-            worth = search.without(best, name).bic - best.bic
+    found = {name: search.without(best, name).bic - best.bic for name in best.names & UNKNOWN.keys()}
+    found |= {effect.name: effect.delta_bic for effect in effects}
+    if found:
+        for name, worth in found.items():
             shares[named(name).slot] += float(np.clip(worth, 0.0, MOST_WORTH))
     elif verdict != "no_mismatch":
         for name, gain in search.gains(best).items():

@@ -17,6 +17,7 @@ from host.gauss_newton import GaussNewton, Mask, Point
 from host.maximum_likelihood import RUNAWAY, annealed, fit_maximum_likelihood, output_error, residuals_at
 from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
 from host.recording import Array, Recording
+from host.wave_forces import wave_forces, wave_forces_from, whitened_among_waves
 
 Names = frozenset[str]
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
@@ -111,13 +112,32 @@ class Fitter:
         known |= {named(n).parameters[0].name: float(v) for n, v in zip(chosen, values, strict=True)}
         structure = structure_of(names)
         parameters = np.array([known[name] for name in structure.names])
-        start = Point(structure, parameters, fit.initial, fit.noise)
+        start = Point(structure, parameters, fit.initial, fit.levels)
         return self._explained(names, self._carried_on(start))
 
     def with_sea(self, explanation: Explanation) -> Explanation:
         """The same set when random forces act as well; whatever grows from it is fitted with them, too."""
         fit = filter_error(explanation.fit, self.inputs(explanation.names))
         return self._explained(explanation.names, fit)
+
+    def with_waves(self, explanation: Explanation, waves: Fit | None = None) -> Explanation:
+        """The same set among waves: the likeliest ones, or those of another fit, held.
+
+        Whatever grows from it is fitted in these waves.
+        """
+        free, inputs, fit = self.free(explanation.names), self.inputs(explanation.names), explanation.fit
+        if waves is None and not fit.waves.any():
+            return self._explained(explanation.names, wave_forces(fit, inputs))
+        start = Point(fit.structure, fit.parameters, fit.initial, (fit if waves is None else waves).levels)
+        climbed = wave_forces_from(start, inputs, free, holds_noise=waves is not None)
+        return self._explained(explanation.names, climbed)
+
+    def with_regular_waves(self, explanation: Explanation, white: Fit) -> Explanation:
+        """A set found among waves with the regular wave nearest to them, and the white forces of a fit."""
+        fit = explanation.fit
+        start = Point(fit.structure, fit.parameters, fit.initial, white.levels)
+        plain = self._explained(explanation.names, self._carried_on(start))
+        return self.grown(plain, "surface_waves", [np.array([0.01, 0.01, 2.0 * np.pi / fit.waves[0]])])
 
     def excess(self, fit: Fit) -> float:
         """Sensor noise of a fit over the noise floor, in the worse channel: 1 where nothing is left."""
@@ -182,7 +202,7 @@ class Fitter:
     def polished(self, explanation: Explanation) -> Explanation:
         """The same set, its fit carried on until nothing more is gained."""
         fit = explanation.fit
-        start = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+        start = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
         return self._explained(explanation.names, self._carried_on(start))
 
     def refitted(self, explanation: Explanation) -> Explanation:
@@ -245,7 +265,12 @@ class Fitter:
     ) -> tuple[list[tuple[Array, Array]], float]:
         """Innovations and sensitivities under the parent's noise, and their sum of squares: inf if lost."""
         with np.errstate(over="ignore", invalid="ignore"):
-            white = (whitened_innovations if parent.fit.has_process_noise else residuals_at)(point, inputs)
+            if parent.fit.waves.any():
+                white = whitened_among_waves(point, inputs)
+            elif parent.fit.has_process_noise:
+                white = whitened_innovations(point, inputs)
+            else:
+                white = residuals_at(point, inputs)
             runs_away = not all(np.abs(S).max() < RUNAWAY for _, S in white)
             return white, np.inf if runs_away else sum(float(np.sum(e**2)) for e, _ in white)
 
@@ -297,7 +322,7 @@ class Fitter:
             known |= {p.name: v for p, v in zip(named(added).parameters, probe.tolist(), strict=True)}
         known |= {name: value for name, value in self.held.items() if name in known}
         structure = structure_of(names)
-        return Point(structure, np.array([known[name] for name in structure.names]), fit.initial, fit.noise)
+        return Point(structure, np.array([known[name] for name in structure.names]), fit.initial, fit.levels)
 
     def _fit(self, starts: list[Point]) -> Fit:
         """Goes a few steps from every start and on from the best."""
@@ -314,6 +339,8 @@ class Fitter:
     def _carried_on(self, start: Point) -> Fit:
         names = frozenset(effect.name for effect in start.structure.effects)
         inputs, free = self.inputs(names), self.free(names)
+        if start.noise.size > 4:
+            return wave_forces_from(start, inputs, free, holds_noise=True)
         if start.noise[2:].any():
             return filter_error_from(start, inputs, free)
         return output_error(start, inputs, free)

@@ -53,12 +53,9 @@ class Leftover:
         return not any(signs)
 
 
-def leftover(fitter: Fitter, best: Explanation, among_waves: Fit | None = None) -> Leftover:
-    """Tests the innovations of an explanation, but for quantised channels: rounding is no white noise.
-
-    among_waves  the fit whose innovations count where waves act
-    """
-    fit = best.fit if among_waves is None else among_waves
+def leftover(fitter: Fitter, best: Explanation) -> Leftover:
+    """Tests the innovations of an explanation, but for quantised channels: rounding is no white noise."""
+    fit = best.fit
     rounded = is_quantised(fitter.recordings)
     tested = ~rounded
     counts = np.sum([np.isfinite(e).sum(axis=1) for e in fit.whitened], axis=0)
@@ -69,7 +66,7 @@ def leftover(fitter: Fitter, best: Explanation, among_waves: Fit | None = None) 
     return Leftover(
         is_coloured=not all(is_white(e, significance=SIGNIFICANCE) and _is_even(e) for e in innovations),
         is_local=_is_local(fitter.recordings, innovations),
-        is_no_sea=among_waves is None and fit.has_process_noise and _heave_by_sea(fit) < LEAST_SEA,
+        is_no_sea=fit.has_process_noise and not fit.waves.any() and _heave_by_sea(fit) < LEAST_SEA,
         is_above_floor=bool((fit.noise[:2] > doubt * fitter.floor).any()),
         smooth_gain=gain,
         is_smooth=bool(gain > chi2.isf(SIGNIFICANCE, terms) * (SEA_DOUBT if fit.has_process_noise else 1.0)),

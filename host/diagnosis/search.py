@@ -25,6 +25,7 @@ FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
 NARROW = 2  # of larger sets, which cost most and of which there are most
 PROMISING, FEW = 6, 3
 RIVALS = 5
+POLISHED = 3
 ROUGH = 60.0  # of BIC, that a fit of the search may gain by polishing
 LARGEST_SET = 5
 NEAR = 1.15  # times the noise floor: little is left, and gains are well predicted
@@ -206,7 +207,9 @@ class Search:
             for name in sorted(rivals - best.names):
                 tasks[smaller.names | {name}] = ("grown", (smaller, name, self._values(name)))
         grown = [self.remember(e) for e in self.workers.results(list(tasks.values()))]
-        close = [e for e in grown if e.bic < best.bic + 4.0 * TWIN_MARGIN]
+        # Twins may lie at the far end of a curved valley, where a short fit does not come.
+        first = sorted(grown, key=lambda e: e.bic)
+        close = [e for k, e in enumerate(first) if k < POLISHED or e.bic < best.bic + 4.0 * TWIN_MARGIN]
         close = [self.remember(e) for e in self.workers.results([("polished", (e,)) for e in close])]
         rival = min(close, key=lambda e: e.bic, default=best)
         return rival if rival.bic < best.bic - 0.01 else None

@@ -59,6 +59,16 @@ def test_short_dives_add_up() -> None:
     assert (together < 0.75 * alone).all()
 
 
+def test_a_dive_that_is_measured_only_late_does_not_spoil_another() -> None:
+    """Its initial state has died away by then, and must not be anything whatever."""
+    first, _ = fly(Dive(seed=1))
+    late, _ = fly(Dive(seed=2, start=(0.1, 0.1, 0.1, 20.0)))
+    late.pitch[:700] = late.depth[:700] = np.nan
+    fit = fit_maximum_likelihood([first, late], held={"heave_offset": 0.0, "pitch_offset": 0.0})
+    assert all(np.abs(initial[1:3]).max() < 1.0 for initial in fit.initial)
+    assert (np.abs(fit.parameters[:6] - TRUTH[:6]) < 4.0 * np.sqrt(np.diag(covariance(fit)))[:6]).all()
+
+
 def test_measured_speed_replaces_u0() -> None:
     speed = 2.5 + 0.8 * np.sign(np.sin(np.arange(1200) / 90.0))
     recording, _ = fly(Dive(speed=speed))

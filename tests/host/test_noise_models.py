@@ -14,6 +14,7 @@ from host.maximum_likelihood import fit_maximum_likelihood
 from host.propagate import free_run, inputs_of
 from host.uncertainty import covariance
 from host.vehicle import default_vehicle
+from host.wave_forces import wave_forces_from, whitened_among_waves
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 
@@ -117,6 +118,15 @@ def test_waves_are_found_with_their_frequency_and_bias_nothing() -> None:
     assert fit.waves[1] == pytest.approx(0.1, abs=0.07)
     std = np.sqrt(np.diag(covariance(fit)))
     assert (np.abs(fit.parameters - TRUTH) < 4.0 * std).all()
+    # A fit that goes on from there, in the same waves, finds nothing more, and its innovations are the same.
+    inputs = [inputs_of(recording)]
+    here = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
+    again = wave_forces_from(here, inputs, fit.free, holds_noise=True)
+    np.testing.assert_allclose(again.levels, fit.levels, rtol=1e-12)
+    assert again.log_likelihood == pytest.approx(fit.log_likelihood, abs=0.1)
+    white, sensitivity = whitened_among_waves(here, inputs)[0]
+    np.testing.assert_allclose(white, np.nan_to_num(fit.whitened[0]), atol=1e-9)
+    assert sensitivity.shape == (2, fit.parameters.size + 4, recording.time.size)
 
 
 def test_wandering_is_told_and_kept_in_the_model() -> None:

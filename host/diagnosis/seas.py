@@ -1,0 +1,65 @@
+"""Searches under random forces: where the sea moves the vehicle, and where it does so with a wave's swing."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from host.catalogue.unknown import SWINGING_MOMENT
+from host.diagnosis.fitter import Explanation
+from host.diagnosis.search import NAMING_MARGIN, Search
+
+WAVES = "surface_waves"
+WAVE_PERIODS = (2.0, 20.0)  # s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Waves:
+    """Surface waves that were named by their swing.
+
+    delta_bic  what white random forces in their place lose
+    fitted     what was found beside them, their band and height estimated with it
+    model      the same with the regular wave nearest to them, to be simulated
+    """
+
+    delta_bic: float
+    fitted: Explanation
+    model: Explanation
+
+
+def in_a_sea(calm: Search, best: Explanation) -> tuple[Search, Explanation]:
+    """The search again with random forces, where these explain more than any set of effects alone.
+
+    Each is charged for what it adds, so a set that leaves white noise needs no sea, and a sea needs no set.
+    """
+    fitter = calm.fitter
+    calm.on_progress("random forces")
+    root, also = fitter.with_sea(calm.root), fitter.with_sea(best)
+    if min(root.bic, also.bic) > best.bic - NAMING_MARGIN:
+        return calm, best
+    rough = Search(fitter, calm.workers, calm.on_progress, fitter.with_sea(calm.base), root)
+    found = rough.run([also])
+    return (rough, found) if found.bic < best.bic else (calm, best)
+
+
+def among_waves(rough: Search, best: Explanation) -> tuple[Search, Explanation, Waves | None]:
+    """Where random forces that swing with a wave's period beat white ones: the search again among them.
+
+    A filter that takes waves for white forces follows the measurements in the wrong band, and so hides what
+    acts beside them. While sets are compared the waves stay as they were first found.
+    """
+    fitter = rough.fitter
+    if not best.fit.has_process_noise or WAVES in best.names:
+        return rough, best, None
+    rough.on_progress("waves")
+    # What swings with a period of its own in the band of waves is the waves.
+    swings = SWINGING_MOMENT.name in best.names
+    first = fitter.with_waves(rough.without(best, SWINGING_MOMENT.name) if swings else best)
+    period = 2.0 * np.pi / first.fit.waves[0]
+    if first.bic > best.bic - NAMING_MARGIN or not WAVE_PERIODS[0] < period < WAVE_PERIODS[1]:
+        return rough, best, None
+    base, root = (fitter.with_waves(one, first.fit) for one in (rough.base, rough.root))
+    search = Search(fitter, rough.workers, rough.on_progress, base, root)
+    found = search.run([first])
+    fitted = first if found.names == first.names else fitter.with_waves(found)
+    model = fitter.with_regular_waves(fitted, best.fit)
+    return search, found, Waves(delta_bic=best.bic - first.bic, fitted=fitted, model=model)
