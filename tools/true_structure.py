@@ -31,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def heldout_errors(path: Path, names: tuple[str, ...], start: dict[str, float]) -> dict[str, float]:
-    """Of the base equations with exactly the named effects.
+    """Of the base equations with exactly the named effects, and their BIC over the stretches that teach.
 
     The likeliest of the fits from the diagnosis's own starts, in whichever order it adds them, and from the
     given one.
@@ -64,7 +64,7 @@ def heldout_errors(path: Path, names: tuple[str, ...], start: dict[str, float]) 
     again = output_error(point, fitter.inputs(told), fit.free)
     if again.log_likelihood > fit.log_likelihood:
         best = Explanation(told, again, fitter.bic(again, told))
-    return misfit(best, spans, noise_floor(recordings)).as_json()
+    return misfit(best, spans, noise_floor(recordings)).as_json() | {"bic": best.bic}
 
 
 if __name__ == "__main__":

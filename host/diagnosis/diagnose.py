@@ -63,6 +63,7 @@ class Diagnosis:
     ranking: list[tuple[str, float]]
     remaining: str
     has_sea: bool
+    bic: float
     std: dict[str, float] = field(default_factory=dict)
 
 
@@ -120,6 +121,7 @@ def diagnose(
         ranking=_ranking(search),
         remaining=_remaining(verdict, model, left, after),
         has_sea=has_sea,
+        bic=best.bic,
         std=std,
     )
 

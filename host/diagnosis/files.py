@@ -75,6 +75,7 @@ def document(answer: Answer) -> dict[str, Any]:
             "pitch_rad": float(np.sqrt(found.floor[0])),
             "depth_m": float(np.sqrt(found.floor[1])),
         },
+        "bic": found.bic,
         "ranking": [{"name": name, "delta_bic": gain} for name, gain in found.ranking],
         "is_held_out": found.is_held_out,
     } | ({against.kind: against.as_json()} if against is not None else {})

@@ -17,6 +17,7 @@ from host.gauss_newton import GaussNewton, Mask, Point
 from host.maximum_likelihood import RUNAWAY, annealed, fit_maximum_likelihood, output_error, residuals_at
 from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
 from host.recording import Array, Recording
+from host.rounding import thinned
 from host.wave_forces import wave_forces, wave_forces_from, whitened_among_waves
 
 Names = frozenset[str]
@@ -44,12 +45,14 @@ class Explanation:
 class Fitter:
     """All that the fits of one diagnosis share: recordings, noise floor, what is held, where fits start.
 
+    measured  the recordings as they are; `recordings` with no more of a quantised channel than it tells
     known  an explanation of other stretches of the same vehicle; without one the base model is fitted
     """
 
     def __init__(self, recordings: list[Recording], known: Explanation | None = None) -> None:
-        self.recordings = recordings
         self.floor = noise_floor(recordings)
+        self.measured = recordings
+        self.recordings = recordings = thinned(recordings)
         self.accelerations = accelerations(recordings)
         self.held = dict(HELD)
         if recordings[0].has_speed:

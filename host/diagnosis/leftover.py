@@ -56,7 +56,7 @@ class Leftover:
 def leftover(fitter: Fitter, best: Explanation) -> Leftover:
     """Tests the innovations of an explanation, but for quantised channels: rounding is no white noise."""
     fit = best.fit
-    rounded = is_quantised(fitter.recordings)
+    rounded = is_quantised(fitter.measured)
     tested = ~rounded
     counts = np.sum([np.isfinite(e).sum(axis=1) for e in fit.whitened], axis=0)
     doubt = np.where(rounded, ROUNDING_DOUBT, np.maximum(FLOOR_DOUBT, 1.0 + FLOOR_SPREAD / np.sqrt(counts)))

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from host.recording import Array, Recording
+from host.rounding import quantum
 
 ORDER = 4  # differences; a smooth motion vanishes in them, white noise grows by a known factor
 
@@ -20,7 +21,7 @@ def noise_floor(recordings: list[Recording]) -> Array:
 def is_quantised(recordings: list[Recording]) -> NDArray[np.bool_]:
     """Whether rounding rules the noise of pitch, of depth."""
     channels = [r.pitch for r in recordings], [r.depth for r in recordings]
-    return np.array([_quantum(pieces) ** 2 / 12.0 > 0.5 * _channel(pieces) for pieces in channels])
+    return np.array([quantum(pieces) ** 2 / 12.0 > 0.5 * _channel(pieces) for pieces in channels])
 
 
 def _channel(pieces: list[Array]) -> float:
@@ -28,16 +29,7 @@ def _channel(pieces: list[Array]) -> float:
     # A channel slower than the grid has gaps at every other row: its own samples are the series.
     differences = np.concatenate([np.diff(piece[np.isfinite(piece)], ORDER) for piece in pieces])
     spread = np.median(np.abs(differences)) / 0.6745 / gain if differences.size >= 20 else 0.0
-    return float(max(spread**2, _quantum(pieces) ** 2 / 12.0, 1e-12))
-
-
-def _quantum(pieces: list[Array]) -> float:
-    """The step of a quantised channel; 0 where hardly any value repeats."""
-    values = np.concatenate([piece[np.isfinite(piece)] for piece in pieces])
-    levels = np.unique(np.round(values, 9))
-    if levels.size < 2 or levels.size > values.size / 3:
-        return 0.0
-    return float(np.median(np.diff(levels)))
+    return float(max(spread**2, quantum(pieces) ** 2 / 12.0, 1e-12))
 
 
 def _binomial(n: int, k: int) -> int:

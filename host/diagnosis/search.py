@@ -48,6 +48,7 @@ class Search:
     base: Explanation
     root: Explanation
     tried: dict[Names, Explanation] = field(default_factory=dict)
+    _shrunk: set[Names] = field(default_factory=set)  # those fitted to the end from a larger set
 
     def run(self, also: list[Explanation] | None = None) -> Explanation:
         """The best explanation all of whose members pay for themselves; `also` are sets worth a look."""
@@ -94,8 +95,16 @@ class Search:
     def pruned(self, explanation: Explanation) -> Explanation:
         """The set less the members that do not pay for themselves."""
         while explanation.names:
-            tasks: list[Task] = [("shrunk", (explanation, member)) for member in sorted(explanation.names)]
-            leanest = min(map(self.remember, self.workers.results(tasks)), key=lambda e: e.bic)
+            smaller = {explanation.names - {member}: member for member in sorted(explanation.names)}
+            tasks: list[Task] = [
+                ("shrunk", (explanation, member))
+                for names, member in smaller.items()
+                if names not in self._shrunk
+            ]
+            for found in self.workers.results(tasks):
+                self.remember(found)
+                self._shrunk.add(found.names)
+            leanest = min((self.tried[names] for names in smaller), key=lambda e: e.bic)
             if leanest.bic > explanation.bic + self.margin(explanation):
                 break
             explanation = leanest
@@ -211,7 +220,10 @@ class Search:
         first = sorted(grown, key=lambda e: e.bic)
         close = [e for k, e in enumerate(first) if k < POLISHED or e.bic < best.bic + 4.0 * TWIN_MARGIN]
         close = [self.remember(e) for e in self.workers.results([("polished", (e,)) for e in close])]
-        rival = min(close, key=lambda e: e.bic, default=best)
+        # Two members may stand for what one does that was not there: with it they are no longer needed.
+        close = [e for e in close if e.bic < best.bic + self.margin(best)]
+        leaner = (self.pruned(e) if len(e.names) > 1 else e for e in close)
+        rival = min(leaner, key=lambda e: e.bic, default=best)
         return rival if rival.bic < best.bic - 0.01 else None
 
     def _is_kin(self, name: str, member: str) -> bool:

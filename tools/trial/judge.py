@@ -46,6 +46,8 @@ class Judged:
     admits        the verdict says that something stays unexplained
     over_floor    held-out free-run error over the noise that no model can foresee; `base_over_floor` before
     over_truth    the same over what the true structure reaches in the same spans
+    truth_lead    by how much the true structure's BIC is better than what was said: above 0 the search missed
+                  it, below 0 no likelihood could have chosen it
     """
 
     recording: str
@@ -65,6 +67,7 @@ class Judged:
     over_floor: float | None = None
     base_over_floor: float | None = None
     over_truth: float | None = None
+    truth_lead: float | None = None
     effect_coefficients: list[Coefficient] = field(default_factory=list)
     base_coefficients: list[Coefficient] = field(default_factory=list)
     seconds: float = 0.0
@@ -129,6 +132,7 @@ def judge(
         over_floor=_over_floor(answer, recorded, diagnosis, "extended"),
         base_over_floor=_over_floor(answer, recorded, diagnosis, "base"),
         over_truth=1.0 if is_exact else _over_truth(diagnosis, true_heldout),
+        truth_lead=0.0 if is_exact else _truth_lead(diagnosis, true_heldout),
         effect_coefficients=_effect_coefficients(answer, effects) if is_exact else [],
         base_coefficients=_base_coefficients(answer, model) if is_exact else [],
         seconds=seconds,
@@ -177,6 +181,12 @@ def _over_truth(diagnosis: dict[str, Any] | None, true: dict[str, Any] | None) -
     if any(error is None or reached is None for error, reached in channels):
         return None
     return sqrt(sum((error / reached) ** 2 for error, reached in channels) / 2)
+
+
+def _truth_lead(diagnosis: dict[str, Any] | None, true: dict[str, Any] | None) -> float | None:
+    if diagnosis is None or true is None or diagnosis.get("bic") is None or true.get("bic") is None:
+        return None
+    return float(diagnosis["bic"] - true["bic"])
 
 
 def _effect_coefficients(answer: Answer, effects: list[dict[str, Any]]) -> list[Coefficient]:

@@ -9,6 +9,7 @@ from statistics import median
 from tools.trial.hidden import KINDS, STRANGERS
 from tools.trial.judge import NOTHING, Coefficient, Judged
 
+NEGLIGIBLE = 0.1  # of BIC: two fits of one set
 BANDS = ((50.0, 300.0), (300.0, 2000.0), (2000.0, 20000.0))  # of misfit; weaker effects are harder to name
 
 
@@ -76,9 +77,11 @@ def score(judged: list[Judged]) -> Score:
         _rate("one hidden: named first", one, lambda j: bool(j.is_first), least=0.92),
         _rate("one hidden: named first or in a class of at most 3", one, lambda j: bool(j.is_in_class), 0.97),
         _rate("one hidden: that and nothing else named", one, lambda j: j.is_exact),
+        _rate("one hidden: no other set is likelier than the true one", one, _is_likeliest),
         _rate("two hidden: both named", two, lambda j: bool(j.are_named), 0.88),
         _rate("two hidden: both named or in a class of at most 3", two, lambda j: bool(j.are_in_class)),
         _rate("two hidden: those and nothing else named", two, lambda j: j.is_exact),
+        _rate("two hidden: no other set is likelier than the true one", two, _is_likeliest),
         _rate("nothing hidden: something named", none, lambda j: bool(j.named) or j.has_failed, most=0.02),
         _rate("nothing hidden: verdict no_mismatch", none, lambda j: j.verdict == "no_mismatch"),
         _rate("outside physics: unexplained or partly explained", outside, lambda j: j.admits, 0.90),
@@ -136,6 +139,10 @@ def _rate(
     return Rate(
         name=name, hits=sum(holds(case) for case in listed), count=len(listed), least=least, most=most
     )
+
+
+def _is_likeliest(judged: Judged) -> bool:
+    return judged.truth_lead is not None and judged.truth_lead >= -NEGLIGIBLE
 
 
 def _within(ratio: float | None, limit: float) -> bool:

@@ -1,0 +1,47 @@
+"""Channels whose resolution, not their noise, limits what they tell."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from host.recording import Array, Recording
+
+SAMPLES_A_LEVEL = 2  # of a value that stays: its beginning and its end are what is new about it
+
+
+def quantum(pieces: list[Array]) -> float:
+    """The step of a quantised channel; 0 where hardly any value repeats."""
+    values = np.concatenate([piece[np.isfinite(piece)] for piece in pieces])
+    levels = np.unique(np.round(values, 9))
+    if levels.size < 2 or levels.size > values.size / 3:
+        return 0.0
+    return float(np.median(np.diff(levels)))
+
+
+def thinned(recordings: list[Recording]) -> list[Recording]:
+    """The recordings with as many values of a quantised channel as its level changes tell.
+
+    While a value stays the same its rounding error is one error, not as many as there are rows: a fit that
+    takes them for independent finds physics in the steps of the rounding. A channel whose noise makes it
+    change level all the time, or that has no steps, stays whole.
+    """
+    depth = _thinned([r.depth for r in recordings])
+    pitch = _thinned([r.pitch for r in recordings])
+    return [replace(r, depth=d, pitch=p) for r, d, p in zip(recordings, depth, pitch, strict=True)]
+
+
+def _thinned(pieces: list[Array]) -> list[Array]:
+    if quantum(pieces) == 0.0:
+        return pieces
+    known = [piece[np.isfinite(piece)] for piece in pieces]
+    changes = sum(int(np.count_nonzero(np.diff(values))) for values in known)
+    every = sum(values.size for values in known) // (SAMPLES_A_LEVEL * max(changes, 1))
+    if every < 2:
+        return pieces
+    kept = []
+    for piece in pieces:
+        rows = np.flatnonzero(np.isfinite(piece))[:: int(every)]
+        thin = np.full_like(piece, np.nan)
+        thin[rows] = piece[rows]
+        kept.append(thin)
+    return kept
