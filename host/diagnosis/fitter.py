@@ -146,14 +146,21 @@ class Fitter:
         """Sensor noise of a fit over the noise floor, in the worse channel: 1 where nothing is left."""
         return float(np.max(fit.noise[:2] / self.floor))
 
-    def grown(self, parent: Explanation, name: str, values: list[Array]) -> Explanation:
+    def grown(
+        self, parent: Explanation, name: str, values: list[Array], rival: Explanation | None = None
+    ) -> Explanation:
         """The parent's set with one effect more, from the two most promising of its start values.
 
         values  start values of the effect's parameters from elsewhere, beside its own probes
+        rival   the parent's set with another effect that does the same work: a start there, too, as the
+                coefficients of a parent without either may be bent into another valley
         """
         probed = sorted(self._probed(parent, named(name), values), key=lambda pair: -pair[0])
         names = parent.names | {name}
         starts = [self._point(names, parent, name, probe) for _, probe in probed[:2]]
+        if rival is not None:
+            starts += [self._point(names, rival, name, probe) for _, probe in probed[:2]]
+            starts += [self._point(names, rival, name, probe) for probe in _same_time(rival, parent, name)]
         if self.excess(parent.fit) > FAR:
             starts = [starts[0], self._guess(starts[0], names)]
         return self._explained(names, self._fit(starts))
@@ -347,6 +354,20 @@ class Fitter:
         if start.noise[2:].any():
             return filter_error_from(start, inputs, free)
         return output_error(start, inputs, free)
+
+
+def is_time(effect: Effect) -> bool:
+    """Whether a delay or a time constant is all that it has."""
+    return [parameter.unit for parameter in effect.parameters] == ["s"]
+
+
+def _same_time(rival: Explanation, parent: Explanation, name: str) -> list[Array]:
+    """The time constant of the effect that the rival has and the parent has not, for another of one."""
+    (other,) = rival.names - parent.names
+    if not all(is_time(named(one)) for one in (other, name)):
+        return []
+    fit = rival.fit
+    return [fit.parameters[[fit.structure.names.index(named(other).parameters[0].name)]]]
 
 
 def _squares(explanation: Explanation) -> float:

@@ -12,7 +12,7 @@ from itertools import combinations
 
 from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, named
 from host.catalogue.nuisance import FREE_TRIM
-from host.diagnosis.fitter import Explanation, Fitter, Names
+from host.diagnosis.fitter import Explanation, Fitter, Names, is_time
 from host.diagnosis.workers import Task, Workers
 from host.recording import Array
 from host.whiteness import correlation_factor
@@ -214,7 +214,8 @@ class Search:
             rivals = set(sorted(likely, key=lambda name: -gains[name])[:RIVALS])
             rivals |= {name for name in gains if self._is_kin(name, member)}
             for name in sorted(rivals - best.names):
-                tasks[smaller.names | {name}] = ("grown", (smaller, name, self._values(name)))
+                beside = best if self._is_kin(name, member) else None
+                tasks[smaller.names | {name}] = ("grown", (smaller, name, self._values(name), beside))
         grown = [self.remember(e) for e in self.workers.results(list(tasks.values()))]
         # Twins may lie at the far end of a curved valley, where a short fit does not come.
         first = sorted(grown, key=lambda e: e.bic)
@@ -227,11 +228,15 @@ class Search:
         return rival if rival.bic < best.bic - 0.01 else None
 
     def _is_kin(self, name: str, member: str) -> bool:
-        """Of the same end of the chain and of some use alone: its gain may be misjudged by prediction."""
+        """Whether prediction may misjudge its gain: both delay, or they share an end of the chain and pay."""
+        if name == member:
+            return False
+        if all(is_time(named(one)) for one in (name, member)):
+            return True
         alone = self.tried.get(self.root.names | {name})
         pays = alone is not None and alone.bic < self.root.bic - NAMING_MARGIN
         slots = {named(name).slot, named(member).slot}
-        return pays and name != member and (len(slots) == 1 or slots == {"actuator", "sensor"})
+        return pays and (len(slots) == 1 or slots == {"actuator", "sensor"})
 
 
 def _candidates(parent: Explanation) -> list[str]:
