@@ -13,6 +13,7 @@ from host.identifiability import ambiguity, open_combinations, undetermined
 from host.identify_car import ESTIMATED, car_least_squares, run_estimator
 from host.maximum_likelihood import fit_maximum_likelihood
 from host.model import VehicleModel, model_of
+from host.outliers import without_outliers
 from host.predict import Prediction, predict
 from host.recording import Array, Recording
 from host.uncertainty import covariance
@@ -58,7 +59,11 @@ def identify(
     method: Method = "ml",
     on_progress: Progress = lambda _: None,
 ) -> Identification:
-    """Identifies one vehicle from its recordings, jointly, by the named method (default: most accurate)."""
+    """Identifies one vehicle from its recordings, jointly, by the named method (default: most accurate).
+
+    Spikes are left out first, of what is learnt from and of what judges.
+    """
+    recordings = without_outliers(recordings)
     model, fit, history = _learn(recordings, vehicle, method, on_progress)
     held_out = None
     if sum(recording.duration for recording in recordings) >= SHORTEST_TO_SPLIT:

@@ -6,6 +6,7 @@ import numpy as np
 
 from host.errors import RecordingError
 from host.model import VehicleModel
+from host.outliers import without_outliers
 from host.propagate import Inputs, free_run, innovations, inputs_of
 from host.recording import Array, Recording
 
@@ -43,11 +44,15 @@ class Prediction:
 
 
 def predict(model: VehicleModel, recording: Recording) -> Prediction:
-    """Runs the model freely on the recording's rudder; only the first 5 s fix the initial state."""
-    inputs = inputs_of(recording, model.structure)
-    opening = recording.between(recording.time[0], recording.time[0] + SETTLING_SPAN)
+    """Runs the model freely on the recording's rudder; only the first 5 s fix the initial state.
+
+    A spike among these is not learnt from; the score is against the values as they were measured.
+    """
+    (cleaned,) = without_outliers([recording])
+    inputs = inputs_of(cleaned, model.structure)
+    opening = cleaned.between(recording.time[0], recording.time[0] + SETTLING_SPAN)
     if opening.time.size < 4:
-        opening = recording.between(recording.time[0], recording.time[min(4, recording.time.size - 1)])
+        opening = cleaned.between(recording.time[0], recording.time[min(4, recording.time.size - 1)])
     initial = estimate_initial_state(model.parameters, opening, inputs)
     run = free_run(model.parameters, initial, inputs)
     return Prediction(recording=recording, outputs=run.outputs, score=score(run.outputs, [recording]))

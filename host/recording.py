@@ -25,7 +25,7 @@ class Recording:
     step        s, nominal interval
     has_angle   whether rudder is an angle in rad; False for another actuator in a unit of its own
     counts      what was refused in the whole file, by cause
-    notes       what was lost or decided on the user's behalf while the file was read, one sentence each
+    notes       what was lost or decided on the user's behalf, one sentence each
     """
 
     name: str
@@ -99,11 +99,11 @@ def split_at_gaps(
             },
         )
         if of_piece.sum() >= 10 and all(np.isfinite(getattr(piece, name)).any() for name in needs):
-            pieces.append(_with_whole_speed(piece))
+            pieces.append(with_whole_speed(piece))
     return pieces
 
 
-def _with_whole_speed(piece: Recording) -> Recording:
+def with_whole_speed(piece: Recording) -> Recording:
     """Speed varies slowly: short losses are bridged linearly, a speed missing half the time is no speed."""
     known = np.isfinite(piece.speed)
     if known.mean() < 0.5:
@@ -111,6 +111,11 @@ def _with_whole_speed(piece: Recording) -> Recording:
     if known.all():
         return piece
     return replace(piece, speed=np.interp(piece.time, piece.time[known], piece.speed[known]))
+
+
+def notes_of(recordings: list[Recording]) -> list[str]:
+    """Each file's notes once, with its name, whatever the number of its stretches."""
+    return list(dict.fromkeys(f"{each.name}: {note}" for each in recordings for note in each.notes))
 
 
 def file_sha256(path: Path) -> str:

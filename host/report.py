@@ -13,7 +13,7 @@ from host.identify import Identification
 from host.model import UNITS
 from host.plots import free_run_plot, history_plot, overview_plot, whiteness_plot
 from host.predict import Prediction
-from host.recording import Recording
+from host.recording import Recording, notes_of
 from host.verdict import verdict
 
 MOST_PLOTS = 4  # a folder of short dives would drown the reader
@@ -41,6 +41,7 @@ def write_report(result: Identification, path: Path) -> None:
         noise=_noise(result),
         plots=_plots(result),
         reading=_reading(result),
+        reading_notes=notes_of(result.recordings),
     )
     path.write_text(page, encoding="utf-8")
 

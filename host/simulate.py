@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from host.model import VehicleModel
+from host.outliers import without_outliers
 from host.predict import SETTLING_SPAN, estimate_initial_state
 from host.propagate import FreeRun, free_run, inputs_of
 from host.recording import Array, Recording
@@ -29,8 +30,9 @@ def simulate(model: VehicleModel, recording: Recording) -> Simulation:
 
     It starts where the first 5 s of depth and pitch say; at rest at depth 0 where these are not recorded.
     """
-    inputs = inputs_of(recording, model.structure)
-    opening = recording.between(recording.time[0], recording.time[0] + SETTLING_SPAN)
+    (cleaned,) = without_outliers([recording])
+    inputs = inputs_of(cleaned, model.structure)
+    opening = cleaned.between(recording.time[0], recording.time[0] + SETTLING_SPAN)
     if np.isfinite(opening.depth).any() and np.isfinite(opening.pitch).any():
         initial = estimate_initial_state(model.parameters, opening, inputs)
     else:

@@ -64,6 +64,14 @@ def joint_or_each(
         yield [recording for recording in recordings if recording.name == name], out / Path(name).stem
 
 
+def tell_notes(recordings: "list[Recording]") -> None:
+    """What was lost or decided while the files were read, on stderr."""
+    from host.recording import notes_of
+
+    for note in notes_of(recordings):
+        print(f"note: {note}", file=sys.stderr)
+
+
 @contextmanager
 def progress(quiet: bool) -> "Iterator[Callable[[str], None]]":
     """A spinner on a terminal, a line per stage on a pipe, nothing when quiet."""

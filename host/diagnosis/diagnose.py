@@ -19,6 +19,7 @@ from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.unknown_physics import known_in, unknown_in, with_unknown
 from host.diagnosis.workers import Workers
 from host.equations import NAMES, Slot
+from host.outliers import without_outliers
 from host.recording import Array, Recording
 from host.uncertainty import covariance
 
@@ -70,7 +71,11 @@ class Diagnosis:
 def diagnose(
     recordings: list[Recording], on_progress: Callable[[str], None] = lambda _: None, jobs: int = 1
 ) -> Diagnosis:
-    """Finds what the paper's equations lack on these recordings of one vehicle, on `jobs` cores."""
+    """Finds what the paper's equations lack on these recordings of one vehicle, on `jobs` cores.
+
+    Spikes are left out first: they are no physics.
+    """
+    recordings = without_outliers(recordings)
     floor = noise_floor(recordings)
     spans = divide(recordings)
     on_progress("base model")

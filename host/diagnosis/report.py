@@ -18,6 +18,7 @@ from host.diagnosis.pictures import (
     slots_picture,
 )
 from host.diagnosis.scoring import Misfit
+from host.recording import notes_of
 from host.version import program_version
 
 HEADLINES = {
@@ -39,6 +40,7 @@ def write_report(answer: Answer, vehicle: str, path: Path) -> None:
         vehicle=vehicle,
         files=list(dict.fromkeys(recording.name for recording in found.recordings)),
         duration=sum(recording.duration for recording in found.recordings),
+        reading_notes=notes_of(found.recordings),
         version=program_version(),
         verdict=found.verdict,
         summary=summary(answer),

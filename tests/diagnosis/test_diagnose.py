@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hidden_dive import hidden_dive
 
-from host.diagnosis.diagnose import diagnose
+from host.diagnosis.diagnose import Diagnosis, diagnose
 from host.diagnosis.noise_floor import noise_floor
 from host.diagnosis.spans import divide
 from tools.cli import main
@@ -63,6 +63,18 @@ def test_coupling_of_pitch_rate_into_heave_is_named_with_its_coefficient() -> No
     assert found.effects[0].heldout_gain > 0.0
     # With one input and u0 unknown a lever arm gives the same transfer function: it must be admitted.
     assert "depth_sensor_lever_arm" in found.effects[0].twins
+
+
+def test_spikes_change_no_name(coupled: Diagnosis) -> None:
+    dive = hidden_dive(lambda _, x, __: (0.8 * x[1], 0.0, 0.0), seed=1)
+    rng = np.random.default_rng(5)
+    for channel, size in ((dive.depth, 4.0), (dive.pitch, 0.4)):
+        at = rng.choice(dive.time.size, dive.time.size // 100, replace=False)
+        channel[at] += size * rng.choice([-1.0, 1.0], at.size)
+    found = diagnose([dive])
+    assert [effect.name for effect in found.effects] == [effect.name for effect in coupled.effects]
+    assert found.verdict == coupled.verdict
+    assert found.recordings[0].counts["outlier.depth"] == 9
 
 
 @pytest.mark.long

@@ -27,6 +27,7 @@ class Dive:
     amplitude: float = 0.25
     start: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 20.0)
     speed: Array | None = None
+    rudder: Array | None = None
 
 
 def multistep(rng: np.random.Generator, rows: int, step: float, amplitude: float) -> Array:
@@ -43,7 +44,7 @@ def fly(dive: Dive) -> tuple[Recording, Array]:
     """The recording, and the noise-free states [w, q, theta, zeta] (4, N)."""
     rng = np.random.default_rng(dive.seed)
     rows = round(dive.duration / dive.step)
-    rudder = multistep(rng, rows, dive.step, dive.amplitude)
+    rudder = multistep(rng, rows, dive.step, dive.amplitude) if dive.rudder is None else dive.rudder
     speed = np.full(rows, dive.vehicle[5]) if dive.speed is None else dive.speed
     kicks = rng.standard_normal((2, rows)) * np.sqrt(np.array(dive.force_density)[:, None] * dive.step)
     states, x = np.empty((4, rows)), np.array(dive.start)

@@ -50,7 +50,7 @@ def test_a_thruster_pitched_dive_is_identified_from_its_logs(
     assert code in (0, 1)
     assert parameters["b2"]["value"] < 0.0
     assert (tmp_path / "report.html").stat().st_size > 50_000
-    assert name.endswith(".BIN") or f"note: {name}: locked to system 1" in capsys.readouterr().out
+    assert name.endswith(".BIN") or f"note: {name}: locked to system 1" in capsys.readouterr().err
 
 
 def test_a_bus_with_rudder_and_attitude_but_no_depth_says_so(

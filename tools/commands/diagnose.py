@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from host.recording import Recording
-from tools.bench import load_vehicle, progress, read_all, require_bench
+from tools.bench import load_vehicle, progress, read_all, require_bench, tell_notes
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,6 +77,7 @@ def run(args: argparse.Namespace) -> int:
         write_extended_model(found, vehicle, args.out / "extended_model.json")
         say("writing the report")
         write_report(answer, vehicle.name, args.out / "report.html")
+    tell_notes(found.recordings)
     print(f"{found.verdict}: {summary(answer)}")
     for sentence in answer.against.sentences if answer.against is not None else []:
         print(f"  {sentence}")

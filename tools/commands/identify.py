@@ -2,12 +2,8 @@
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from tools.bench import joint_or_each, load_vehicle, progress, read_all, require_bench
-
-if TYPE_CHECKING:
-    from host.recording import Recording
+from tools.bench import joint_or_each, load_vehicle, progress, read_all, require_bench, tell_notes
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,13 +56,9 @@ def run(args: argparse.Namespace) -> int:
                     print(f"  {name:13s} {entry['value']:+10.5f} +- {entry['std']:.5f} {entry['unit']}")
             for line in advice(result):
                 print(f"  to learn {line}")
-            for note in (*result.notes, *_reading_notes(recordings)):
+            for note in result.notes:
                 print(f"  note: {note}")
+            tell_notes(result.recordings)
             print(f"model:  {folder / 'model.json'}\nreport: {folder / 'report.html'}")
             worst = max(worst, 1 if result.undetermined else 0)
     return worst
-
-
-def _reading_notes(recordings: "list[Recording]") -> list[str]:
-    """Each file's notes once, whatever the number of its stretches."""
-    return list(dict.fromkeys(f"{each.name}: {note}" for each in recordings for note in each.notes))
