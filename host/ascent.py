@@ -73,7 +73,7 @@ def ascend(
     holds_noise  whether the noise levels stay as they are, which saves most of the work
     """
     here, damping, converged, used = place(point, model), 1e-3, False, 0
-    while not converged and used < most_steps:
+    while not converged and used < most_steps and np.isfinite(here.likelihood):
         used += 1
         step = GaussNewton(model.whitened(here.point, here.passes), here.point, free)
         scoring = None if holds_noise else _Scoring(here, model)

@@ -6,7 +6,7 @@ Source: Maine and Iliff, NASA RP-1138; Klein and Morelli, Aircraft System Identi
 import numpy as np
 
 from host.ascent import ascend
-from host.fit import Fit, finished
+from host.fit import Fit, finished, run_away
 from host.gauss_newton import Mask, Point, whiten
 from host.kalman import KalmanPass, kalman_pass
 from host.propagate import Inputs, innovations
@@ -49,6 +49,8 @@ def filter_error_from(point: Point, inputs: list[Inputs], free: Mask, most_steps
     """The same from any point with forces."""
     model = RandomForces(inputs)
     end, used, converged = ascend(point, model, free, most_steps)
+    if not np.isfinite(end.likelihood):
+        return run_away(point, inputs, free)
     white = model.whitened(end.point, end.passes)
     return finished(end.point, white, inputs, free, end.likelihood, used, converged)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from host.equations import Structure
 from host.gauss_newton import GaussNewton, Mask, Point
-from host.propagate import Inputs
+from host.propagate import NX0, Inputs
 from host.recording import Array
 
 
@@ -74,6 +74,13 @@ class Fit:
     def samples(self) -> int:
         """Values measured, pitch and depth together."""
         return sum(int(np.isfinite(e).sum()) for e in self.whitened)
+
+
+def run_away(point: Point, inputs: list[Inputs], free: Mask) -> Fit:
+    """What a start ends as from which the model leaves the numbers: of no likelihood, chosen by nobody."""
+    rows = [one.drive.shape[1] for one in inputs]
+    nothing = [(np.zeros((2, count)), np.zeros((2, free.size + NX0, count))) for count in rows]
+    return finished(point.with_noise(np.ones(4)), nothing, inputs, free, -np.inf, 0, False)
 
 
 def finished(

@@ -16,7 +16,7 @@ import numpy as np
 from host.coloured_noise import coloured_noise
 from host.equations import BASE, Structure
 from host.filter_error import filter_error, whitened_innovations
-from host.fit import Fit, finished
+from host.fit import Fit, finished, run_away
 from host.gauss_newton import GaussNewton, Mask, Point, whiten
 from host.propagate import Inputs, free_run, innovations, inputs_of
 from host.recording import Array, Recording
@@ -136,16 +136,7 @@ def output_error(
     noise = _residual_noise([error for error, _ in parts], inputs)
     cost = _concentrated_cost(noise, inputs)
     if not np.isfinite(cost) or not all(np.abs(S).max() < RUNAWAY for _, S in parts):
-        # A start from which the model runs away: nothing can be improved from here.
-        return finished(
-            point.with_noise(np.ones(4)),
-            [(np.zeros_like(e), np.zeros_like(S)) for e, S in parts],
-            inputs,
-            free,
-            -np.inf,
-            0,
-            False,
-        )
+        return run_away(point, inputs, free)
     while not converged and iterations < most_iterations:
         iterations += 1
         step = GaussNewton(_whitened_by(noise, parts), point, free)

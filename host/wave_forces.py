@@ -15,7 +15,7 @@ import numpy as np
 from host.ascent import ascend
 from host.equations import Chain, Effect, Parameter, Structure
 from host.filter_error import RandomForces
-from host.fit import Fit, finished
+from host.fit import Fit, finished, run_away
 from host.gauss_newton import Mask, Point
 from host.kalman import KalmanPass, kalman_pass
 from host.propagate import Inputs
@@ -109,6 +109,8 @@ def wave_forces_from(
     end, used, converged = ascend(
         wider, model, np.concatenate([free, [False, False]]), most_steps, holds_noise
     )
+    if not np.isfinite(end.likelihood):
+        return run_away(point, inputs, free)
     white = _less_shape(model.whitened(end.point, end.passes), free.size)
     noise = end.point.noise
     # What is told as the force's density is that of slow motion, where the vehicle answers.
