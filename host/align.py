@@ -1,13 +1,12 @@
 """Asynchronous measurements to samples on the fixed grid of the estimator. Gaps stay gaps."""
 
-from bisect import bisect_right
-from collections import Counter, deque
+from collections import Counter
 from dataclasses import dataclass
-from itertools import pairwise
-from math import inf, nan
+from math import nan
 
 from bridge.measurement import Measurement, Quantity
 from firmware_model.sample import Sample
+from host.channel import Channel
 
 _HELD = Quantity.RUDDER
 _NEEDED = frozenset({Quantity.DEPTH, Quantity.PITCH, Quantity.RUDDER})
@@ -17,13 +16,6 @@ _ON_GRID = 0.01
 
 # So many measurements refused in a row as older than their channel mean that the clock was set back.
 _CLOCK_SET_BACK = 20
-
-# An interval longer than so many usual ones has lost a measurement: halfway between none and one.
-_LOST_ONE = 1.5
-
-# Of the last so many intervals, this share is taken for too short to have lost one, however many are lost.
-_INTERVALS = 32
-_SHARE = 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,81 +64,6 @@ class AlignConfig:
         return max(5.0, 10 * self.step, 2 * self.latency_s) if self.split_gap is None else self.split_gap
 
 
-class _Channel:
-    """The recent measurements of one quantity, in order of time."""
-
-    def __init__(self) -> None:
-        self.times: list[int] = []
-        self.values: list[float] = []
-        self._intervals: deque[int] = deque(maxlen=_INTERVALS)  # before those that are kept
-
-    def append(self, t_us: int, value: float) -> None:
-        self.times.append(t_us)
-        self.values.append(value)
-
-    def forget_before(self, t_us: int) -> None:
-        """Drops what no instant from `t_us` on can need: all but the last at or before it."""
-        old = bisect_right(self.times, t_us) - 1
-        if old > 0:
-            self._intervals.extend(after - before for before, after in pairwise(self.times[: old + 1]))
-            del self.times[:old], self.values[:old]
-
-    def interpolated(self, t_us: int, max_gap_us: int, near_us: int) -> float:
-        right = bisect_right(self.times, t_us)
-        near = [i for i in (right - 1, right) if 0 <= i < len(self.times)]
-        best = min(near, key=lambda i: abs(self.times[i] - t_us), default=None)
-        if best is None:
-            return nan
-        if abs(self.times[best] - t_us) <= near_us:
-            return self.values[best]
-        if len(near) < 2 or self.times[right] - self.times[right - 1] > max_gap_us:
-            return nan
-        before, after = self.values[right - 1], self.values[right]
-        share = (t_us - self.times[right - 1]) / (self.times[right] - self.times[right - 1])
-        # Rounding must not leave the interval between the neighbours.
-        return min(max(before + share * (after - before), min(before, after)), max(before, after))
-
-    def held_mean(self, t_us: int, until_us: int, hold_us: int, near_us: int) -> float:
-        """Mean from `t_us` to `until_us` of values that each hold until the next one."""
-        first = bisect_right(self.times, t_us + near_us) - 1
-        if first < 0 or t_us - self.times[first] > hold_us:
-            return nan
-        last = bisect_right(self.times, until_us - near_us)
-        mean, end_us = self.values[first], until_us
-        for k in range(last - 1, first, -1):
-            mean += (self.values[k] - self.values[first]) * (end_us - self.times[k]) / (until_us - t_us)
-            end_us = self.times[k]
-        return mean
-
-    @property
-    def _usual_interval(self) -> float:
-        """Mean of the recent intervals in which nothing was lost; inf before there are any."""
-        if not self._intervals:
-            return inf
-        short = sorted(self._intervals)[int(_SHARE * len(self._intervals))]
-        whole = [interval for interval in self._intervals if interval <= _LOST_ONE * short]
-        return sum(whole) / len(whole)
-
-    def has_lost_change(self, t_us: int, until_us: int, known_to_us: int, near_us: int) -> bool:
-        """Whether from `t_us` to `until_us` the value may have changed unheard.
-
-        A value holds until the next one is due. Beyond that it holds if the next one was not lost, or says
-        the same. What came after `known_to_us` is not looked at.
-        """
-        first = max(0, bisect_right(self.times, t_us + near_us) - 1)
-        last = bisect_right(self.times, until_us - near_us)
-        usual = self._usual_interval
-        for k in range(first, last):
-            if self.times[k] + usual >= until_us - near_us:
-                continue
-            is_heard = k + 1 < len(self.times) and self.times[k + 1] <= known_to_us
-            next_us = self.times[k + 1] if is_heard else known_to_us
-            is_same = is_heard and self.values[k + 1] == self.values[k]
-            if next_us - self.times[k] > _LOST_ONE * usual and not is_same:
-                return True
-        return False
-
-
 class Aligner:
     """Turns measurements, pushed in the order in which they came, into samples at whole steps.
 
@@ -183,7 +100,7 @@ class Aligner:
         self._boot = 0
         self._newest: int | None = None  # time of the newest measurement of the segment
         self._next: int | None = None  # the instant to complete next; None until the grid is placed
-        self._channels = {quantity: _Channel() for quantity in Quantity}
+        self._channels = {quantity: Channel() for quantity in Quantity}
         self._refused_in_a_row = 0
 
     def push(self, measurement: Measurement) -> list[Sample]:
@@ -221,7 +138,7 @@ class Aligner:
 
     def _clear(self) -> None:
         self._newest = self._next = None
-        self._channels = {quantity: _Channel() for quantity in Quantity}
+        self._channels = {quantity: Channel() for quantity in Quantity}
         self._refused_in_a_row = 0
 
     def _start(self, measurement: Measurement, ended: list[Sample]) -> list[Sample]:
@@ -289,7 +206,7 @@ class Aligner:
             pitch_rate=at[Quantity.PITCH_RATE],
         )
 
-    def _held(self, channel: _Channel, t_us: int) -> float:
+    def _held(self, channel: Channel, t_us: int) -> float:
         assert self._newest is not None
         until_us = t_us + self._step_us
         # Further on, how much has come depends on how the channels interleave.
