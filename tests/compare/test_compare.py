@@ -11,7 +11,7 @@ from tools.accuracy.methods import recording_of
 from tools.compare import methods
 from tools.compare.__main__ import main
 from tools.compare.free_run import best_of
-from tools.compare.held_out import compare, divide, judge, median_of, table_of
+from tools.compare.held_out import FAILED, HeldOut, compare, divide, judge, median_of, table_of
 from tools.compare.series import series_of
 
 
@@ -119,6 +119,15 @@ def test_the_missing_are_named_with_the_way_to_get_them(monkeypatch):
 def test_bad_usage_ends_with_2(arguments, message, capsys):
     assert main([*arguments, "--quiet"]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_method_without_a_model_is_worse_than_any():
+    nothing = HeldOut(method="m", fit=FAILED, chi2=FAILED, rmse=FAILED, seconds=1.0)
+    good = HeldOut(method="m", fit=np.array([90.0, 80.0]), chi2=np.ones(2), rmse=np.ones(2), seconds=3.0)
+    median = median_of([good, nothing, good])
+    np.testing.assert_array_equal(median.fit, good.fit)
+    assert np.isneginf(median_of([nothing, nothing, good]).fit).all()
+    assert np.isposinf(median_of([nothing, nothing, good]).chi2).all()
 
 
 @pytest.mark.long

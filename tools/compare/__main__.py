@@ -3,6 +3,7 @@
     python -m tools.compare RECORDING... [--vehicle F] [--only TEXT] [--json FILE]
 
 Each recording is a vehicle of its own: every method learns from its first 70 % and runs freely over the rest.
+Of several recordings the medians come last.
 """
 
 import argparse
@@ -39,19 +40,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     require_bench()
-    from tools.compare.held_out import compare, table_of
+    from tools.compare.held_out import compare, median_of, table_of
     from tools.compare.methods import EXTENDED, LINEAR, extended_model, installed, linear_model, missing
 
     everyone = installed() | {LINEAR: linear_model, EXTENDED: extended_model}
     methods = {name: teach for name, teach in everyone.items() if args.only in name}
     if not methods:
         raise ConfigError(f"--only must be part of one of: {', '.join(everyone)} (got {args.only!r})")
-    vehicle, document = load_vehicle(args.vehicle), {}
+    vehicle, document, everything = load_vehicle(args.vehicle), {}, []
     warnings.simplefilter("ignore")  # the packages warn at every setting that does not suit
     with progress(args.quiet) as say:
         for path in args.recordings:
             lines = compare(read_all([path], vehicle, say), say, methods)
-            print(f"{path.name}\n{table_of(lines)}\n")
+            everything.append(lines)
+            print(f"{path.name}\n{table_of(lines)}\n", flush=True)
             document[path.name] = [
                 {
                     "method": line.method,
@@ -62,6 +64,9 @@ def _run(args: argparse.Namespace) -> int:
                 }
                 for line in lines
             ]
+    if len(everything) > 1:
+        medians = [median_of(list(of_method)) for of_method in zip(*everything, strict=True)]
+        print(f"medians over {len(everything)} recordings\n{table_of(medians)}\n")
     if missing():
         print(missing())
     if args.json is not None:

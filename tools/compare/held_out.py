@@ -116,12 +116,13 @@ def judge(name: str, run: FreeRun, judging: list[Recording], floor: Array, secon
 
 
 def median_of(several: list[HeldOut]) -> HeldOut:
-    """Of one method over several dives."""
+    """Of one method over several dives; where it gives no model it is worse than any."""
+    fit, chi2, rmse = (np.array([getattr(one, name) for one in several]) for name in ("fit", "chi2", "rmse"))
     return HeldOut(
         method=several[0].method,
-        fit=np.median([one.fit for one in several], axis=0),
-        chi2=np.median([one.chi2 for one in several], axis=0),
-        rmse=np.median([one.rmse for one in several], axis=0),
+        fit=np.median(np.where(np.isnan(fit), -np.inf, fit), axis=0),
+        chi2=np.median(np.where(np.isnan(chi2), np.inf, chi2), axis=0),
+        rmse=np.median(np.where(np.isnan(rmse), np.inf, rmse), axis=0),
         seconds=float(np.median([one.seconds for one in several])),
     )
 
