@@ -40,7 +40,8 @@ def heldout_errors(path: Path, names: tuple[str, ...], start: dict[str, float]) 
     import numpy as np
 
     from host.catalogue import OFFSETS
-    from host.diagnosis.fitter import Explanation, Fitter
+    from host.diagnosis.explanation import Explanation
+    from host.diagnosis.fitter import Fitter
     from host.diagnosis.noise_floor import noise_floor
     from host.diagnosis.scoring import misfit
     from host.diagnosis.spans import divide

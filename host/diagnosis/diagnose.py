@@ -7,7 +7,8 @@ from typing import Literal
 import numpy as np
 
 from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, UNKNOWN, named
-from host.diagnosis.fitter import Explanation, Fitter
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import SEA_DOUBT, Leftover, leftover
 from host.diagnosis.locate import Location, locate
 from host.diagnosis.noise_floor import noise_floor
@@ -88,7 +89,7 @@ def diagnose(
             best = with_unknown(search, best)
             left = leftover(fitter, best)
         waves, model = None, best
-        if not left.is_nothing:
+        if unknown_in(best) or not left.is_nothing:
             search, best = in_a_sea(search, best)
             search, best, waves = among_waves(search, best)
             left = leftover(fitter, best if waves is None else waves.fitted)

@@ -9,7 +9,7 @@ import numpy as np
 from host.catalogue import BY_NAME
 from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import Diagnosis
-from host.diagnosis.fitter import Explanation
+from host.diagnosis.explanation import Explanation
 from host.diagnosis.scoring import Misfit
 from host.equations import NAMES
 from host.model import model_of, write_model

@@ -1,45 +1,32 @@
 """Fits of sets of effects, jointly with the base, to the recordings of one vehicle."""
 
-from dataclasses import dataclass, replace
 from math import log
 
 import numpy as np
 
 from host.catalogue import named, structure_of
 from host.catalogue.nuisance import FREE_TRIM
-from host.catalogue.unknown import ANY_SMOOTH_FORCE, FORMS, SPANS
+from host.catalogue.unknown import SPANS
+from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations, first_guess
 from host.diagnosis.noise_floor import noise_floor
+from host.diagnosis.prospects import form_gains, gain, probed
 from host.equations import NAMES, Effect
-from host.filter_error import filter_error, filter_error_from, whitened_innovations
+from host.filter_error import filter_error, filter_error_from
 from host.fit import Fit
-from host.gauss_newton import GaussNewton, Mask, Point
-from host.maximum_likelihood import RUNAWAY, annealed, fit_maximum_likelihood, output_error, residuals_at
+from host.gauss_newton import Mask, Point
+from host.maximum_likelihood import annealed, fit_maximum_likelihood, output_error
 from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
 from host.recording import Array, Recording
 from host.rounding import thinned
-from host.wave_forces import wave_forces, wave_forces_from, whitened_among_waves
+from host.wave_forces import wave_forces, wave_forces_from
 
-Names = frozenset[str]
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
 RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exact twins
 FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
 # Enough to rank sets; those that count are polished.
 FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 12, 0.2
 LINES_TRIED = 3
-
-
-@dataclass(frozen=True, slots=True)
-class Explanation:
-    """A set of effects, fitted jointly with the base."""
-
-    names: Names
-    fit: Fit
-    bic: float
-
-    def lean(self) -> "Explanation":
-        """Without the sensitivities of every row: those of a whole search fill the memory."""
-        return replace(self, fit=replace(self.fit, scores=[]))
 
 
 class Fitter:
@@ -66,7 +53,7 @@ class Fitter:
         parameters = self.base.fit.parameters
         self._longest_substep = longest_substep(parameters)
         self._speed = float(parameters[NAMES.index("u0")])
-        self._scales = {
+        self.scales = {
             "": 1.0,
             "rudder": float(max(np.abs(r.rudder).max() for r in recordings)) or 1.0,
             "duration": float(recordings[-1].time[-1]),
@@ -155,55 +142,27 @@ class Fitter:
         rival   the parent's set with another effect that does the same work: a start there, too, as the
                 coefficients of a parent without either may be bent into another valley
         """
-        probed = sorted(self._probed(parent, named(name), values), key=lambda pair: -pair[0])
+        likely = sorted(probed(self, parent, named(name), values), key=lambda pair: -pair[0])
         names = parent.names | {name}
-        starts = [self._point(names, parent, name, probe) for _, probe in probed[:2]]
-        if rival is not None:
-            starts += [self._point(names, rival, name, probe) for _, probe in probed[:2]]
-            starts += [self._point(names, rival, name, probe) for probe in _same_time(rival, parent, name)]
+        starts = [self.point(names, parent, name, probe) for _, probe in likely[:2]]
         if self.excess(parent.fit) > FAR:
             starts = [starts[0], self._guess(starts[0], names)]
+        if rival is not None:
+            starts += [self.point(names, rival, name, probe) for _, probe in likely[:2]]
+            starts += [self.point(names, rival, name, probe) for probe in _same_time(rival, parent, name)]
         return self._explained(names, self._fit(starts))
 
     def gain(self, parent: Explanation, name: str, values: list[Array], is_thorough: bool) -> float:
-        """Twice the log-likelihood an effect could gain on top of the parent: one Gauss-Newton step ahead.
-
-        From `values` alone, or where these are none or it is to be thorough, from its own probes, too.
-        """
-        probed = self._probed(parent, named(name), values, is_thorough or not values)
-        return max(gain for gain, _ in probed)
+        """See host.diagnosis.prospects, as for `form_gains`: here for the workers to call."""
+        return gain(self, parent, name, values, is_thorough)
 
     def form_gains(self, parent: Explanation) -> dict[str, float]:
-        """What each form of unknown physics could take off the BIC on top of the parent, predicted.
-
-        Those of the motion share the sensitivities of one propagation with all of them at zero.
-        """
-        names = parent.names | {ANY_SMOOTH_FORCE.name}
-        structure, inputs = structure_of(names), self.inputs(names)
-        point = self._point(names, parent, ANY_SMOOTH_FORCE.name, np.zeros(len(ANY_SMOOTH_FORCE.parameters)))
-        white, cost = self._whitened(point, inputs, parent)
-        own = {parameter.name for parameter in ANY_SMOOTH_FORCE.parameters}
-        free = self.free(names) & np.array([name not in own for name in structure.names])
-        before, charge = _squares(parent), log(parent.fit.samples)
-        gains = {}
-        for form in FORMS:
-            if form.name in parent.names:
-                continue
-            if form.parameters[0].name in own:
-                with_it = free | np.array([name == form.parameters[0].name for name in structure.names])
-                left = (
-                    GaussNewton(white, point, with_it).predicted_cost(cost) if np.isfinite(cost) else np.inf
-                )
-                gain = before - left
-            else:
-                gain = self.gain(parent, form.name, [], is_thorough=True)
-            gains[form.name] = gain - charge * self.free_parameters(frozenset({form.name}))
-        return gains
+        return form_gains(self, parent)
 
     def shrunk(self, parent: Explanation, name: str) -> Explanation:
         """The parent's set without one of its effects."""
         names = parent.names - {name}
-        start = self._point(names, parent)
+        start = self.point(names, parent)
         starts = [start]
         if self.excess(parent.fit) > FAR:
             starts.append(self._guess(start, names))
@@ -255,65 +214,6 @@ class Fitter:
     def _explained(self, names: Names, fit: Fit) -> Explanation:
         return Explanation(names, fit, self.bic(fit, names))
 
-    def _probed(
-        self, parent: Explanation, effect: Effect, values: list[Array], is_thorough: bool = True
-    ) -> list[tuple[float, Array]]:
-        """Predicted gain and start values of an effect, for each of its probes."""
-        names = parent.names | {effect.name}
-        inputs, free = self.inputs(names), self.free(names)
-        before = _squares(parent)
-        probed = []
-        for probe in [*values, *(self._probes(effect, parent) if is_thorough else [])]:
-            point = self._point(names, parent, effect.name, probe)
-            white, cost = self._whitened(point, inputs, parent)
-            left = GaussNewton(white, point, free).predicted_cost(cost) if np.isfinite(cost) else np.inf
-            probed.append((before - left, probe))
-        return probed
-
-    def _whitened(
-        self, point: Point, inputs: list[Inputs], parent: Explanation
-    ) -> tuple[list[tuple[Array, Array]], float]:
-        """Innovations and sensitivities under the parent's noise, and their sum of squares: inf if lost."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            if parent.fit.waves.any():
-                white = whitened_among_waves(point, inputs)
-            elif parent.fit.has_process_noise:
-                white = whitened_innovations(point, inputs)
-            else:
-                white = residuals_at(point, inputs)
-            runs_away = not all(np.abs(S).max() < RUNAWAY for _, S in white)
-            return white, np.inf if runs_away else sum(float(np.sum(e**2)) for e, _ in white)
-
-    def _probes(self, effect: Effect, parent: Explanation) -> list[Array]:
-        scales = np.array([self._scales[scale] for scale in effect.scales or ("",) * len(effect.parameters)])
-        probes = [np.array(probe) * scales for probe in effect.probes]
-        if effect.periods is not None:
-            # The start values' last entry is a period, and it must be nearly right.
-            probes = [
-                np.array([*probes[0][:-1], period]) for period in self._periods(effect.periods, parent.fit)
-            ]
-        return probes
-
-    def _periods(self, limits: tuple[float, float], fit: Fit) -> list[float]:
-        """The strongest periods in what the longest recording leaves, pitch and depth together, s."""
-        longest = max(range(len(self.recordings)), key=lambda k: self.recordings[k].duration)
-        step, residual = self.recordings[longest].step, fit.whitened[longest]
-        filled = np.where(np.isfinite(residual), residual - np.nanmean(residual, axis=1, keepdims=True), 0.0)
-        rows = 4 * filled.shape[1]  # padded fourfold, as phases drift over the whole span
-        frequencies = np.fft.rfftfreq(rows, step)[1:]
-        size = np.linalg.norm(np.fft.rfft(filled, rows), axis=0)[1:]
-        span = step * filled.shape[1]
-        inside = (frequencies >= 1.0 / min(limits[1], 1.5 * span)) & (frequencies <= 1.0 / limits[0])
-        # What is slower than the recording is long has no line of its own, and the base bends to it.
-        periods = [share * span for share in (0.3, 0.7) if limits[0] < share * span < limits[1]]
-        lines: list[float] = []
-        for k in np.flatnonzero(inside)[np.argsort(-size[inside])]:
-            if all(abs(frequencies[k] - line) > 1.0 / span for line in lines):
-                lines.append(float(frequencies[k]))
-            if len(lines) == LINES_TRIED:
-                break
-        return [*(1.0 / line for line in lines), *periods] or [limits[0]]
-
     def _guess(self, start: Point, names: Names) -> Point:
         """The rough values of regression where it gives some, `start` elsewhere, moved into their valley."""
         rough = first_guess(self.recordings, self._speed, names)
@@ -323,9 +223,10 @@ class Fitter:
         point = Point(start.structure, values, start.initial, np.array([*self.floor, 0.0, 0.0]))
         return annealed(point, self.inputs(names), self.free(names), self.accelerations)
 
-    def _point(
+    def point(
         self, names: Names, parent: Explanation, added: str | None = None, probe: Array | None = None
     ) -> Point:
+        """A start for a set: the parent's values, and for an effect that it has not, those of a probe."""
         fit = parent.fit
         known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
         if added is not None and probe is not None:
@@ -368,10 +269,6 @@ def _same_time(rival: Explanation, parent: Explanation, name: str) -> list[Array
         return []
     fit = rival.fit
     return [fit.parameters[[fit.structure.names.index(named(other).parameters[0].name)]]]
-
-
-def _squares(explanation: Explanation) -> float:
-    return sum(float(np.nansum(e**2)) for e in explanation.fit.whitened)
 
 
 def _first(values: Array) -> float:

@@ -8,7 +8,8 @@ from host.catalogue import BY_NAME, named
 from host.diagnosis.answer import Against, Answer
 from host.diagnosis.comparison import Comparison, EffectDifference, Side, compare
 from host.diagnosis.diagnose import SLOTS, Diagnosis, NamedEffect
-from host.diagnosis.fitter import Explanation, Fitter
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import Fitter
 from host.diagnosis.locate import locate
 from host.diagnosis.scoring import free_run_errors, misfit
 from host.diagnosis.spans import divide

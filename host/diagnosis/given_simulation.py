@@ -16,7 +16,8 @@ from host.catalogue import named
 from host.diagnosis.answer import Against, Answer
 from host.diagnosis.comparison import SIGNIFICANCE, compare, side_of
 from host.diagnosis.diagnose import Diagnosis, diagnose
-from host.diagnosis.fitter import Explanation, Fitter
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
 from host.errors import RecordingError
 from host.recording import Array, Recording

@@ -9,7 +9,8 @@ from scipy.signal import periodogram
 from scipy.stats import chi2
 
 from host.catalogue.unknown import ANY_SMOOTH_FORCE
-from host.diagnosis.fitter import Explanation, Fitter
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import Fitter
 from host.diagnosis.noise_floor import is_quantised
 from host.equations import NAMES
 from host.fit import Fit

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.diagnosis.fitter import Explanation
+from host.diagnosis.explanation import Explanation
 from host.diagnosis.spans import Spans
 from host.predict import SETTLING_SPAN, estimate_initial_state
 from host.propagate import free_run, inputs_of

@@ -9,10 +9,12 @@ could gain beside others is predicted by one Gauss-Newton step from there, and t
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
+from math import log
 
 from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, named
 from host.catalogue.nuisance import FREE_TRIM
-from host.diagnosis.fitter import Explanation, Fitter, Names, is_time
+from host.diagnosis.explanation import Explanation, Names
+from host.diagnosis.fitter import Fitter, is_time
 from host.diagnosis.workers import Task, Workers
 from host.recording import Array
 from host.whiteness import correlation_factor
@@ -64,19 +66,28 @@ class Search:
         return self._settled()
 
     def twins(self, best: Explanation, name: str) -> list[str]:
-        """The effects that would do the work of one member as well, or nearly: the two closest."""
+        """The effects that would do the work of one member as well, or nearly: the two closest.
+
+        Parsimony chooses a name, but excludes no other: of two that fit alike, the one with more coefficients
+        is charged as a forecast would be (Akaike), not by what it costs to prefer it.
+        """
         exchanged = {
-            next(iter(names - best.names)): explanation.bic - best.bic
+            next(iter(names - best.names)): explanation
             for names, explanation in self.tried.items()
             if len(names) == len(best.names) and best.names - names == {name}
         }
-        others = {other: lag for other, lag in exchanged.items() if other in BY_NAME}
+        limit = TWIN_MARGIN * correlation_factor(best.fit.whitened)
         close = {
-            other: lag
-            for other, lag in others.items()
-            if lag < TWIN_MARGIN * correlation_factor(best.fit.whitened)
+            other: explanation.bic
+            for other, explanation in exchanged.items()
+            if other in BY_NAME and explanation.bic - best.bic - self._excess(explanation, best) < limit
         }
         return sorted(close, key=lambda other: close[other])[: LARGEST_CLASS - 1]
+
+    def _excess(self, explanation: Explanation, best: Explanation) -> float:
+        """Of BIC, what more coefficients than the best set has are charged beyond Akaike's 2 for each."""
+        more = self.fitter.free_parameters(explanation.names) - self.fitter.free_parameters(best.names)
+        return max(more, 0) * (log(best.fit.samples) - 2.0)
 
     def without(self, best: Explanation, name: str) -> Explanation:
         """The set less one member."""

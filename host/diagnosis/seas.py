@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.catalogue.unknown import SWINGING_MOMENT
-from host.diagnosis.fitter import Explanation
+from host.diagnosis.explanation import Explanation
 from host.diagnosis.search import NAMING_MARGIN, Search
 
 WAVES = "surface_waves"
@@ -47,13 +47,14 @@ def among_waves(rough: Search, best: Explanation) -> tuple[Search, Explanation, 
     A filter that takes waves for white forces follows the measurements in the wrong band, and so hides what
     acts beside them. While sets are compared the waves stay as they were first found.
     """
-    fitter = rough.fitter
-    if not best.fit.has_process_noise or WAVES in best.names:
+    fitter, swings = rough.fitter, SWINGING_MOMENT.name in best.names
+    if WAVES in best.names or not (best.fit.has_process_noise or swings):
         return rough, best, None
     rough.on_progress("waves")
-    # What swings with a period of its own in the band of waves is the waves.
-    swings = SWINGING_MOMENT.name in best.names
-    first = fitter.with_waves(rough.without(best, SWINGING_MOMENT.name) if swings else best)
+    # What swings in the band of waves may be the waves.
+    plain = rough.without(best, SWINGING_MOMENT.name) if swings else best
+    white = plain if plain.fit.has_process_noise else fitter.with_sea(plain)
+    first = fitter.with_waves(white)
     period = 2.0 * np.pi / first.fit.waves[0]
     if first.bic > best.bic - NAMING_MARGIN or not WAVE_PERIODS[0] < period < WAVE_PERIODS[1]:
         return rough, best, None
@@ -61,5 +62,5 @@ def among_waves(rough: Search, best: Explanation) -> tuple[Search, Explanation, 
     search = Search(fitter, rough.workers, rough.on_progress, base, root)
     found = search.run([first])
     fitted = first if found.names == first.names else fitter.with_waves(found)
-    model = fitter.with_regular_waves(fitted, best.fit)
+    model = fitter.with_regular_waves(fitted, white.fit)
     return search, found, Waves(delta_bic=best.bic - first.bic, fitted=fitted, model=model)

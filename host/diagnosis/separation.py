@@ -13,7 +13,8 @@ import numpy as np
 
 from host.catalogue import BY_NAME
 from host.diagnosis.diagnose import Diagnosis
-from host.diagnosis.fitter import Explanation, Fitter
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import Fitter
 from host.diagnosis.manoeuvres import Manoeuvre, library
 from host.diagnosis.search import TWIN_MARGIN, Progress
 from host.equations import NAMES, Effect, Slot

@@ -6,7 +6,7 @@ explains the recording better, and with it some of them are no longer needed.
 """
 
 from host.catalogue import BY_NAME, UNKNOWN
-from host.diagnosis.fitter import Explanation
+from host.diagnosis.explanation import Explanation
 from host.diagnosis.search import NAMING_MARGIN, Search
 
 PROMISING = 2  # forms beside each set that are fitted in earnest

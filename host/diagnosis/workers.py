@@ -6,7 +6,8 @@ from concurrent.futures import ProcessPoolExecutor
 from types import TracebackType
 from typing import Any
 
-from host.diagnosis.fitter import Explanation, Fitter
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import Fitter
 
 Task = tuple[str, tuple[Any, ...]]
 """A method of Fitter and its arguments."""

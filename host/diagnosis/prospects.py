@@ -1,0 +1,120 @@
+"""What an effect could gain beside others, one Gauss-Newton step ahead, and from which start values."""
+
+from math import log
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from host.catalogue import named, structure_of
+from host.catalogue.unknown import ANY_SMOOTH_FORCE, FORMS
+from host.diagnosis.explanation import Explanation
+from host.equations import Effect
+from host.filter_error import whitened_innovations
+from host.fit import Fit
+from host.gauss_newton import GaussNewton, Point
+from host.maximum_likelihood import RUNAWAY, residuals_at
+from host.propagate import Inputs
+from host.recording import Array
+from host.wave_forces import whitened_among_waves
+
+if TYPE_CHECKING:
+    from host.diagnosis.fitter import Fitter
+
+LINES_TRIED = 3
+
+
+def gain(fitter: "Fitter", parent: Explanation, name: str, values: list[Array], is_thorough: bool) -> float:
+    """Twice the log-likelihood an effect could gain on top of the parent: one Gauss-Newton step ahead.
+
+    From `values` alone, or where these are none or it is to be thorough, from its own probes, too.
+    """
+    return max(ahead for ahead, _ in probed(fitter, parent, named(name), values, is_thorough or not values))
+
+
+def form_gains(fitter: "Fitter", parent: Explanation) -> dict[str, float]:
+    """What each form of unknown physics could take off the BIC on top of the parent, predicted.
+
+    Those of the motion share the sensitivities of one propagation with all of them at zero.
+    """
+    names = parent.names | {ANY_SMOOTH_FORCE.name}
+    structure, inputs = structure_of(names), fitter.inputs(names)
+    point = fitter.point(names, parent, ANY_SMOOTH_FORCE.name, np.zeros(len(ANY_SMOOTH_FORCE.parameters)))
+    white, cost = _whitened(point, inputs, parent)
+    own = {parameter.name for parameter in ANY_SMOOTH_FORCE.parameters}
+    free = fitter.free(names) & np.array([name not in own for name in structure.names])
+    before, charge = parent.squares, log(parent.fit.samples)
+    gains = {}
+    for form in FORMS:
+        if form.name in parent.names:
+            continue
+        if form.parameters[0].name in own:
+            with_it = free | np.array([name == form.parameters[0].name for name in structure.names])
+            left = GaussNewton(white, point, with_it).predicted_cost(cost) if np.isfinite(cost) else np.inf
+            ahead = before - left
+        else:
+            ahead = gain(fitter, parent, form.name, [], is_thorough=True)
+        gains[form.name] = ahead - charge * fitter.free_parameters(frozenset({form.name}))
+    return gains
+
+
+def probed(
+    fitter: "Fitter", parent: Explanation, effect: Effect, values: list[Array], is_thorough: bool = True
+) -> list[tuple[float, Array]]:
+    """Predicted gain and start values of an effect, for each of its probes."""
+    names = parent.names | {effect.name}
+    inputs, free = fitter.inputs(names), fitter.free(names)
+    before = parent.squares
+    found = []
+    for probe in [*values, *(_probes(fitter, effect, parent) if is_thorough else [])]:
+        point = fitter.point(names, parent, effect.name, probe)
+        white, cost = _whitened(point, inputs, parent)
+        left = GaussNewton(white, point, free).predicted_cost(cost) if np.isfinite(cost) else np.inf
+        found.append((before - left, probe))
+    return found
+
+
+def _whitened(
+    point: Point, inputs: list[Inputs], parent: Explanation
+) -> tuple[list[tuple[Array, Array]], float]:
+    """Innovations and sensitivities under the parent's noise, and their sum of squares: inf if lost."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        if parent.fit.waves.any():
+            white = whitened_among_waves(point, inputs)
+        elif parent.fit.has_process_noise:
+            white = whitened_innovations(point, inputs)
+        else:
+            white = residuals_at(point, inputs)
+        runs_away = not all(np.abs(S).max() < RUNAWAY for _, S in white)
+        return white, np.inf if runs_away else sum(float(np.sum(e**2)) for e, _ in white)
+
+
+def _probes(fitter: "Fitter", effect: Effect, parent: Explanation) -> list[Array]:
+    scales = np.array([fitter.scales[scale] for scale in effect.scales or ("",) * len(effect.parameters)])
+    probes = [np.array(probe) * scales for probe in effect.probes]
+    if effect.periods is not None:
+        # The start values' last entry is a period, and it must be nearly right.
+        probes = [
+            np.array([*probes[0][:-1], period]) for period in _periods(fitter, effect.periods, parent.fit)
+        ]
+    return probes
+
+
+def _periods(fitter: "Fitter", limits: tuple[float, float], fit: Fit) -> list[float]:
+    """The strongest periods in what the longest recording leaves, pitch and depth together, s."""
+    longest = max(range(len(fitter.recordings)), key=lambda k: fitter.recordings[k].duration)
+    step, residual = fitter.recordings[longest].step, fit.whitened[longest]
+    filled = np.where(np.isfinite(residual), residual - np.nanmean(residual, axis=1, keepdims=True), 0.0)
+    rows = 4 * filled.shape[1]  # padded fourfold, as phases drift over the whole span
+    frequencies = np.fft.rfftfreq(rows, step)[1:]
+    size = np.linalg.norm(np.fft.rfft(filled, rows), axis=0)[1:]
+    span = step * filled.shape[1]
+    inside = (frequencies >= 1.0 / min(limits[1], 1.5 * span)) & (frequencies <= 1.0 / limits[0])
+    # What is slower than the recording is long has no line of its own, and the base bends to it.
+    periods = [share * span for share in (0.3, 0.7) if limits[0] < share * span < limits[1]]
+    lines: list[float] = []
+    for k in np.flatnonzero(inside)[np.argsort(-size[inside])]:
+        if all(abs(frequencies[k] - line) > 1.0 / span for line in lines):
+            lines.append(float(frequencies[k]))
+        if len(lines) == LINES_TRIED:
+            break
+    return [*(1.0 / line for line in lines), *periods] or [limits[0]]
