@@ -28,10 +28,11 @@ NARROW = 2  # of larger sets, which cost most and of which there are most
 PROMISING, FEW = 6, 3
 RIVALS = 5
 POLISHED = 3
+SMALL = 3  # members; the fits of larger sets cost most, and an exchange of one says least
 ROUGH = 60.0  # of BIC, that a fit of the search may gain by polishing
 LARGEST_SET = 5
 NEAR = 1.15  # times the noise floor: little is left, and gains are well predicted
-MOST_ROUNDS = 6
+MOST_ROUNDS = 4
 
 Progress = Callable[[str], None]
 
@@ -50,6 +51,7 @@ class Search:
     base: Explanation
     root: Explanation
     tried: dict[Names, Explanation] = field(default_factory=dict)
+    _rivals: set[Names] = field(default_factory=set)  # those fitted in the place of another
     _shrunk: set[Names] = field(default_factory=set)  # those fitted to the end from a larger set
 
     def run(self, also: list[Explanation] | None = None) -> Explanation:
@@ -219,12 +221,17 @@ class Search:
         tasks: dict[Names, Task] = {}
         for smaller in fewer:
             (member,) = best.names - smaller.names
-            gains = self.gains(smaller)
+            is_small = len(best.names) <= SMALL
+            gains = self.gains(smaller, is_small)
             worth = smaller.bic - best.bic
             likely = [name for name in gains if gains[name] > 0.5 * worth]
-            rivals = set(sorted(likely, key=lambda name: -gains[name])[:RIVALS])
-            rivals |= {name for name in gains if self._is_kin(name, member)}
+            rivals = set(sorted(likely, key=lambda name: -gains[name])[: RIVALS if is_small else FEW])
+            kin = {name for name in gains if self._is_kin(name, member)}
+            rivals |= kin if is_small else {name for name in kin if is_time(named(name))}
             for name in sorted(rivals - best.names):
+                if smaller.names | {name} in self._rivals:
+                    continue
+                self._rivals.add(smaller.names | {name})
                 beside = best if self._is_kin(name, member) else None
                 tasks[smaller.names | {name}] = ("grown", (smaller, name, self._values(name), beside))
         grown = [self.remember(e) for e in self.workers.results(list(tasks.values()))]
