@@ -30,7 +30,7 @@ RIVALS = 5
 POLISHED = 3
 SMALL = 3  # members; the fits of larger sets cost most, and an exchange of one says least
 ROUGH = 60.0  # of BIC, that a fit of the search may gain by polishing
-LARGEST_SET = 5
+LARGEST_SET = 4
 NEAR = 1.15  # times the noise floor: little is left, and gains are well predicted
 MOST_ROUNDS = 4
 
@@ -189,6 +189,8 @@ class Search:
             if rival is None:
                 break
             best = rival
+            if len(best.names) > SMALL:
+                break
         return best
 
     def _retrimmed(self) -> Explanation:
@@ -219,9 +221,9 @@ class Search:
     def _exchanged(self, best: Explanation, fewer: list[Explanation]) -> Explanation | None:
         """The best set with one member exchanged for another, where that is better still."""
         tasks: dict[Names, Task] = {}
+        is_small = len(best.names) <= SMALL
         for smaller in fewer:
             (member,) = best.names - smaller.names
-            is_small = len(best.names) <= SMALL
             gains = self.gains(smaller, is_small)
             worth = smaller.bic - best.bic
             likely = [name for name in gains if gains[name] > 0.5 * worth]
@@ -237,11 +239,12 @@ class Search:
         grown = [self.remember(e) for e in self.workers.results(list(tasks.values()))]
         # Twins may lie at the far end of a curved valley, where a short fit does not come.
         first = sorted(grown, key=lambda e: e.bic)
-        close = [e for k, e in enumerate(first) if k < POLISHED or e.bic < best.bic + 4.0 * TWIN_MARGIN]
+        least = POLISHED if is_small else 1
+        close = [e for k, e in enumerate(first) if k < least or e.bic < best.bic + 4.0 * TWIN_MARGIN]
         close = [self.remember(e) for e in self.workers.results([("polished", (e,)) for e in close])]
         # Two members may stand for what one does that was not there: with it they are no longer needed.
         close = [e for e in close if e.bic < best.bic + self.margin(best)]
-        leaner = (self.pruned(e) if len(e.names) > 1 else e for e in close)
+        leaner = (self.pruned(e) if 1 < len(e.names) <= SMALL else e for e in close)
         rival = min(leaner, key=lambda e: e.bic, default=best)
         return rival if rival.bic < best.bic - 0.01 else None
 

@@ -7,11 +7,11 @@ explains the recording better, and with it some of them are no longer needed.
 
 from host.catalogue import BY_NAME, UNKNOWN
 from host.diagnosis.explanation import Explanation
-from host.diagnosis.search import NAMING_MARGIN, Search
+from host.diagnosis.search import NAMING_MARGIN, SMALL, Search
 
 PROMISING = 2  # forms beside each set that are fitted in earnest
 FAIR_PART = 0.3  # of what a member was worth, that a form in its place must promise: predictions are local
-MOST_ROUNDS = 4
+MOST_ROUNDS = 3
 
 
 def with_unknown(search: Search, best: Explanation) -> Explanation:
@@ -44,8 +44,9 @@ def _grown(search: Search, best: Explanation) -> list[Explanation]:
         # What a form gains where a member is gone must come near to what the member was worth.
         least = max(NAMING_MARGIN, FAIR_PART * (parent.bic - best.bic))
         likely = sorted((name for name in gains if gains[name] > least), key=lambda name: -gains[name])
-        for name in likely[:PROMISING]:
+        for name in likely[: PROMISING if len(best.names) <= SMALL else 1]:
             chosen[parent.names | {name}] = parent, name
     grown = search.workers.results([("grown", (parent, name, [])) for parent, name in chosen.values()])
     polished = search.workers.results([("polished", (e,)) for e in grown])
-    return [search.remember(e) for e in sorted(polished, key=lambda e: e.bic)[:2]]
+    count = 2 if len(best.names) <= SMALL else 1
+    return [search.remember(e) for e in sorted(polished, key=lambda e: e.bic)[:count]]
