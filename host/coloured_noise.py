@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import solve_banded
 
 from host.ascent import ascend
-from host.fit import Fit, finished
+from host.fit import Fit, finished, run_away
 from host.gauss_newton import Point
 from host.propagate import Inputs, free_run, innovations
 from host.recording import Array
@@ -113,6 +113,8 @@ def coloured_noise(start: Fit, inputs: list[Inputs], most_steps: int = 15) -> Fi
     first = np.clip([*half, *half, FIRST_TIME, FIRST_TIME], model.least, model.most)
     point = Point(start.structure, start.parameters, start.initial, first)
     end, used, converged = ascend(point, model, start.free, most_steps)
+    if not np.isfinite(end.likelihood):
+        return run_away(point, inputs, start.free)
     white = model.whitened(end.point, end.passes)
     noise = end.point.noise
     at_end = end.point.with_noise(np.array([*noise[:2], 0.0, 0.0]))

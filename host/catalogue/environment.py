@@ -2,27 +2,25 @@
 
 import casadi as ca
 
+from host.catalogue.oscillation import oscillation, oscillation_parameters
 from host.equations import Chain, Effect, Parameter
 
 GRAVITY = 9.80665  # m/s^2
+INTERNAL_PERIODS = (15.0, 20000.0)  # s
+WAVE_PERIODS = (2.0, 20.0)  # s
 
 
 def _current(c: Chain) -> None:
     c.climb += c.p["current"]
 
 
-def _oscillation(c: Chain, name: str) -> ca.SX:
-    phase = 2 * ca.pi * c.time / c.p[f"{name}_period"]
-    return c.p[f"{name}_sine"] * ca.sin(phase) + c.p[f"{name}_cosine"] * ca.cos(phase)
-
-
 def _internal_wave(c: Chain) -> None:
-    c.climb += _oscillation(c, "internal")
+    c.climb += oscillation(c, "internal")
 
 
 def _surface_waves(c: Chain) -> None:
     number = (2 * ca.pi / c.p["wave_period"]) ** 2 / GRAVITY  # deep water
-    c.climb += _oscillation(c, "wave") * ca.exp(-number * c.zeta)
+    c.climb += oscillation(c, "wave") * ca.exp(-number * c.zeta)
 
 
 EFFECTS = (
@@ -41,35 +39,23 @@ EFFECTS = (
     Effect(
         name="internal_wave",
         slot="environment",
-        parameters=(
-            Parameter(name="internal_sine", unit="m/s", lower=-3, upper=3, meaning="vertical water motion"),
-            Parameter(name="internal_cosine", unit="m/s", lower=-3, upper=3, meaning="vertical water motion"),
-            Parameter(name="internal_period", unit="s", lower=15, upper=20000, meaning="period"),
-        ),
+        parameters=oscillation_parameters("internal", "m/s", 3, INTERNAL_PERIODS, "vertical water motion"),
         sentence="The water heaves slowly up and down (an internal wave).",
         equation="zeta' = ... + internal_sine sin(2 pi t/T) + internal_cosine cos(2 pi t/T)",
         manoeuvre="a straight level run of several periods with the planes fixed",
         probes=((1e-3, 1e-3, 100.0),),
-        periods=(15.0, 20000.0),
+        periods=INTERNAL_PERIODS,
         force=_internal_wave,
     ),
     Effect(
         name="surface_waves",
         slot="environment",
-        parameters=(
-            Parameter(
-                name="wave_sine", unit="m/s", lower=-20, upper=20, meaning="orbital speed at the surface"
-            ),
-            Parameter(
-                name="wave_cosine", unit="m/s", lower=-20, upper=20, meaning="orbital speed at the surface"
-            ),
-            Parameter(name="wave_period", unit="s", lower=2, upper=20, meaning="period"),
-        ),
+        parameters=oscillation_parameters("wave", "m/s", 20, WAVE_PERIODS, "orbital speed at the surface"),
         sentence="Surface waves carry the vehicle up and down, less so the deeper it is.",
         equation="zeta' = ... + exp(-k zeta) (wave_sine sin ot + wave_cosine cos ot), o = 2 pi/T, k = o^2/g",
         manoeuvre="level runs at two depths, the shallower one within a few metres of the surface",
         probes=((0.01, 0.01, 7.0),),
-        periods=(2.0, 20.0),
+        periods=WAVE_PERIODS,
         force=_surface_waves,
     ),
 )

@@ -10,6 +10,7 @@ from typing import Literal
 
 import casadi as ca
 
+from host.catalogue.oscillation import oscillation, oscillation_parameters
 from host.equations import Chain, Effect, Parameter
 
 Side = Literal["heave", "pitch"]
@@ -19,6 +20,7 @@ RATE = {"heave": "w'", "pitch": "q'"}
 UNIT = {"heave": "m/s^2", "pitch": "rad/s^2"}
 MOTION = ("w", "q", "theta", "delta")
 DEGREE = 7  # of what wanders slowly: about as many turns as a tide or a leak takes in one recording
+SWING_PERIODS = (2.0, 20000.0)  # s
 SPANS = {side: f"wander_{side}_span" for side in SIDES}
 """The parameters that hold the length of the recording, s, over which a force wanders."""
 
@@ -56,7 +58,13 @@ def _push(side: Side, shape: str, term: Term) -> Callable[[Chain], None]:
 
 
 def _share(side: Side, shape: str) -> Parameter:
-    return Parameter(name=f"{side}_{shape}", unit="SI", lower=-1e6, upper=1e6, meaning="share of the term")
+    return Parameter(
+        name=f"{side}_{shape}",
+        unit=f"({UNIT[side]})/({shape})",
+        lower=-1e6,
+        upper=1e6,
+        meaning="share of the term",
+    )
 
 
 def _of_motion(side: Side, shape: str, term: Term) -> Effect:
@@ -97,8 +105,8 @@ def _wandering(side: Side) -> Effect:
     names = tuple(f"wander_{side}_{k}" for k in range(1, DEGREE + 1))
 
     def force(c: Chain) -> None:
-        # Chebyshev polynomials of the time: T_k+1 = 2 x T_k - T_k-1.
-        x = 2 * c.time / c.p[SPANS[side]] - 1
+        # Chebyshev polynomials of the time, T_k+1 = 2 x T_k - T_k-1; after the recording its last value.
+        x = ca.fmin(2 * c.time / c.p[SPANS[side]] - 1, 1)
         before, now, value = ca.SX(1), x, ca.SX(0)
         for name in names:
             value += c.p[name] * now
@@ -126,23 +134,18 @@ def _wandering(side: Side) -> Effect:
 
 
 def _swinging_moment(c: Chain) -> None:
-    phase = 2 * ca.pi * c.time / c.p["swing_period"]
-    c.pitch += c.p["swing_sine"] * ca.sin(phase) + c.p["swing_cosine"] * ca.cos(phase)
+    c.pitch += oscillation(c, "swing")
 
 
 SWINGING_MOMENT = Effect(
     name="unknown_swinging_moment",
     slot="pitch",
-    parameters=(
-        Parameter(name="swing_sine", unit="rad/s^2", lower=-20, upper=20, meaning="moment"),
-        Parameter(name="swing_cosine", unit="rad/s^2", lower=-20, upper=20, meaning="moment"),
-        Parameter(name="swing_period", unit="s", lower=2, upper=20000, meaning="period"),
-    ),
+    parameters=oscillation_parameters("swing", UNIT["pitch"], 20, SWING_PERIODS, "moment"),
     sentence="A moment acts that swings with a period of its own, and does not move the water.",
     equation="q' = ... + swing_sine sin(2 pi t/T) + swing_cosine cos(2 pi t/T), T = swing_period",
     manoeuvre="a straight level run of several periods with the planes fixed",
     probes=((1e-3, 1e-3, 10.0),),
-    periods=(2.0, 20000.0),
+    periods=SWING_PERIODS,
     force=_swinging_moment,
 )
 

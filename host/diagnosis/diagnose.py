@@ -97,7 +97,7 @@ def diagnose(
         on_progress("held-out check")
         before, after = misfit(search.base, spans, floor), misfit(model, spans, floor)
         effects = [_named(search, best, name, spans, floor, after) for name in known_in(best)]
-        if waves is not None:
+        if waves is not None and WAVES not in best.names:
             effects.append(NamedEffect(name=WAVES, delta_bic=waves.delta_bic))
         effects.sort(key=lambda effect: -effect.delta_bic)
         verdict = _verdict(model, left, before, after)
@@ -211,10 +211,11 @@ def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfi
     )
     if verdict == "no_mismatch":
         return "Nothing is missing from the base model on this recording." + sea
+    forms = "".join(f" {sentence}" for sentence in unknown_in(best))
     if verdict == "explained":
         return "What is left is as small as the sensors' own noise." if not sea else sea.strip()
-    if unknown_in(best) and left.is_nothing:
-        return f"Physics is at work that the catalogue does not hold. {' '.join(unknown_in(best))}" + sea
+    if forms and left.is_nothing:
+        return f"Physics is at work that the catalogue does not hold.{forms}" + sea
     worst = "depth" if after.chi2_depth > after.chi2_pitch else "pitch"
     size = max(after.chi2_depth, after.chi2_pitch) ** 0.5
     if left.is_smooth:
@@ -229,4 +230,7 @@ def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfi
         kind = "it is as rough as sensor noise, but larger than these sensors show elsewhere"
     is_part = verdict == "partly_explained"
     begin = "Most is explained, but" if is_part else "None of the physics in the catalogue explains this:"
-    return f"{begin} {worst} is still off by {size:.1f} times its sensor noise in a free run; {kind}." + sea
+    return (
+        f"{begin} {worst} is still off by {size:.1f} times its sensor noise in a free run; {kind}.{forms}"
+        + sea
+    )

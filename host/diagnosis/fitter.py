@@ -127,6 +127,8 @@ class Fitter:
         fit = explanation.fit
         start = Point(fit.structure, fit.parameters, fit.initial, white.levels)
         plain = self._explained(explanation.names, self._carried_on(start))
+        if "surface_waves" in plain.names:
+            return plain
         return self.grown(plain, "surface_waves", [np.array([0.01, 0.01, 2.0 * np.pi / fit.waves[0]])])
 
     def excess(self, fit: Fit) -> float:

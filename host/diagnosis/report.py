@@ -18,6 +18,7 @@ from host.diagnosis.pictures import (
     slots_picture,
 )
 from host.diagnosis.scoring import Misfit
+from host.diagnosis.unknown_physics import unknown_in
 from host.recording import notes_of
 from host.version import program_version
 
@@ -79,9 +80,9 @@ def summary(answer: Answer) -> str:
         return f"Nothing is missing: the {base_name(answer)} can reproduce this down to the sensors' noise."
     if not found.effects and found.verdict == "explained":
         return "The given model lacks no physics, but what it holds is not what the recording shows."
-    if not found.effects:
+    if not found.effects and not unknown_in(found.extended):
         return "Simulation and recording differ, and none of the physics in the catalogue explains it."
-    names = [title(effect.name) for effect in found.effects]
+    names = [title(effect.name) for effect in found.effects] or ["a force of which only the form is known"]
     listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
     before, after = found.base_misfit, found.extended_misfit
     gain = (
@@ -92,7 +93,9 @@ def summary(answer: Answer) -> str:
     lead = {
         "explained": f"Left out was: {listed}.",
         "partly_explained": f"Part of it is explained by {listed}.",
-        "unexplained": f"The nearest of the catalogue, {listed}, does not explain it.",
+        "unexplained": f"The nearest of the catalogue, {listed}, does not explain it."
+        if found.effects
+        else f"None of the physics in the catalogue explains it, but {listed} comes near.",
     }[found.verdict]
     return f"{lead} With it, {gain} {where}."
 

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from host.catalogue.environment import WAVE_PERIODS
 from host.catalogue.unknown import SWINGING_MOMENT
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.search import NAMING_MARGIN, Search
 
 WAVES = "surface_waves"
-WAVE_PERIODS = (2.0, 20.0)  # s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

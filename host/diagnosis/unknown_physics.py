@@ -12,6 +12,7 @@ from host.diagnosis.search import NAMING_MARGIN, SMALL, Search
 PROMISING = 2  # forms beside each set that are fitted in earnest
 FAIR_PART = 0.3  # of what a member was worth, that a form in its place must promise: predictions are local
 MOST_ROUNDS = 3
+MOST_TOLD = 3  # coefficients that a sentence can hold
 
 
 def with_unknown(search: Search, best: Explanation) -> Explanation:
@@ -26,8 +27,15 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
 
 
 def unknown_in(explanation: Explanation) -> list[str]:
-    """The sentences of the forms of unknown physics in a set."""
-    return [UNKNOWN[name].sentence for name in sorted(explanation.names & UNKNOWN.keys())]
+    """The forms of unknown physics in a set, in words: what acts, its equation, its coefficients if few."""
+    fit = explanation.fit
+    values = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
+    said = []
+    for form in (UNKNOWN[name] for name in sorted(explanation.names & UNKNOWN.keys())):
+        listed = [f"{p.name} = {values[p.name]:.3g} {p.unit}" for p in form.parameters]
+        told = f"; {', '.join(listed)}" if len(listed) <= MOST_TOLD else ""
+        said.append(f"{form.sentence[:-1]} ({form.equation}{told}).")
+    return said
 
 
 def known_in(explanation: Explanation) -> list[str]:

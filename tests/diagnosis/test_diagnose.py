@@ -35,6 +35,9 @@ def test_judging_spans_teach_nothing() -> None:
     assert np.isnan(teaching.pitch[judged]).all()
     np.testing.assert_array_equal(teaching.pitch[~judged], recording.pitch[~judged])
     assert 0.15 < judged.mean() < 0.35
+    (unseen,) = spans.unseen
+    np.testing.assert_array_equal(np.isfinite(unseen.depth), judged)
+    np.testing.assert_array_equal(unseen.depth[judged], recording.depth[judged])
 
 
 def test_of_many_short_dives_every_third_judges() -> None:

@@ -7,8 +7,10 @@ import pytest
 
 from host.catalogue import BY_NAME, UNKNOWN, named, structure_of
 from host.catalogue.unknown import FORMS
+from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.files import write_extended_model
+from host.diagnosis.report import summary
 from host.equations import Effect
 from host.model import read_model
 from host.predict import predict
@@ -43,6 +45,8 @@ def test_a_mass_that_turns_is_unexplained_and_described(tmp_path: Path) -> None:
     assert values["swing_period"] == pytest.approx(11.0, rel=0.01)
     assert np.hypot(values["swing_sine"], values["swing_cosine"]) == pytest.approx(0.08, rel=0.05)
     assert "swings with a period" in found.remaining
+    assert "swing_period = 11 s" in found.remaining
+    assert "only the form is known" in summary(Answer(found=found))
     # The model that is handed back includes it, and says so by name.
     path = tmp_path / "extended_model.json"
     write_extended_model(found, vehicle_from_table({"name": "auv", "speed": 2.5}, file="auv"), path)

@@ -98,6 +98,14 @@ def test_held_out_error_over_the_true_structure() -> None:
     assert judged(answer(), effect("trim_moment")).over_truth == 1.0
 
 
+def test_the_lead_of_the_true_structure_tells_a_missed_search_from_a_tie() -> None:
+    true = {"depth_rmse_m": 0.1, "pitch_rmse_rad": 0.01, "bic": -120.0}
+    said = diagnosis(effect("net_buoyancy")) | {"bic": -100.0}
+    assert judge(answer(), recorded(), said, true_heldout=true).truth_lead == pytest.approx(20.0)
+    assert judge(answer(), recorded(), said).truth_lead is None
+    assert judged(answer(), effect("trim_moment")).truth_lead == 0.0
+
+
 def test_held_out_noise_is_that_of_the_spans_where_they_are_told() -> None:
     told = diagnosis(effect("trim_moment"))
     told["extended"]["heldout"]["spans_s"] = [[0.4, 0.6]]
