@@ -50,7 +50,8 @@ class Chain:
 
     p            parameters by name
     extra        states of effects by name
-    speed        u, m/s, measured where `is_speed_known` is 1; `speed_ratio` u / u0, on which forces depend
+    speed        u, m/s, measured where `is_speed_known` is 1; `speed_ratio` u / u0, on which forces depend;
+    surge        u', m/s^2, of the measured speed
     command      rad, the plane as commanded; `earlier` the commands of the rows before, newest first
     plane        rad, the angle at which the plane acts
     heave, pitch, climb   terms added to w' (m/s^2), q' (rad/s^2), zeta' (m/s)
@@ -68,6 +69,7 @@ class Chain:
     speed: ca.SX
     is_speed_known: ca.SX
     speed_ratio: ca.SX
+    surge: ca.SX
     command: ca.SX
     earlier: list[ca.SX]
     plane: ca.SX
@@ -148,7 +150,7 @@ class Structure:
         """The symbols at one instant; `drive` as in host.propagate.Inputs."""
         p = dict(zip(self.names, ca.vertsplit(parameters), strict=True))
         w, q, theta, zeta, *extra = ca.vertsplit(x)
-        rudder, measured, is_known, interval, _, *earlier = ca.vertsplit(drive)
+        rudder, measured, is_known, interval, _, surge, *earlier = ca.vertsplit(drive)
         speed = p["u0"] * (1 - is_known) + measured * is_known
         return Chain(
             p=p,
@@ -162,6 +164,7 @@ class Structure:
             speed=speed,
             is_speed_known=is_known,
             speed_ratio=ca.SX(1),
+            surge=surge,
             command=rudder,
             earlier=earlier,
             plane=rudder,

@@ -28,8 +28,9 @@ ROWS_AT_ONCE = 256
 class Inputs:
     """What drives the equations over one recording, and what was measured. N rows.
 
-    drive     (5 + lags, N) commanded rudder rad, speed m/s, 1 where the speed is known, interval to the next
-              row s, time s; then, where the structure looks back, earlier commands, newest first
+    drive     (6 + lags, N) commanded rudder rad, speed m/s, 1 where the speed is known, interval to the next
+              row s, time s, surge acceleration m/s^2; then, where the structure looks back, earlier
+              commands, newest first
     measured  (2, N) pitch rad and depth m, 0 where missing
     present   (2, N) 1 where measured, else 0
     """
@@ -48,6 +49,7 @@ def inputs_of(
     intervals = recording.intervals
     known = np.full(intervals.size, float(recording.has_speed))
     speed = smoothed_speed(recording.speed) if recording.has_speed else np.zeros(intervals.size)
+    surge = np.append(np.diff(speed) / intervals[:-1], 0.0)
     lags = int(np.ceil(LONGEST_DELAY / recording.step)) + 1 if structure.needs_lags else 0
     earlier = [
         np.concatenate([np.full(min(lag, intervals.size), recording.rudder[0]), recording.rudder])[
@@ -59,7 +61,7 @@ def inputs_of(
     present = np.isfinite(measured)
     return Inputs(
         structure=structure,
-        drive=np.vstack([recording.rudder, speed, known, intervals, recording.time, *earlier]),
+        drive=np.vstack([recording.rudder, speed, known, intervals, recording.time, surge, *earlier]),
         measured=np.where(present, measured, 0.0),
         present=present.astype(float),
         substeps=int(np.ceil(recording.step / max(longest_substep, recording.step / MOST_SUBSTEPS) - 1e-6)),

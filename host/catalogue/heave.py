@@ -26,6 +26,11 @@ def _ballast(c: Chain) -> None:
     c.heave += c.p["c_wb"] * after(c.time, c.p["ballast_time"])
 
 
+def _acceleration(c: Chain) -> None:
+    turning = c.p["a2"] * c.speed_ratio * c.q + c.p["a3"] * c.theta + c.p["b2"] * c.speed_ratio**2 * c.plane
+    c.heave += c.p["c_wa"] * turning
+
+
 EFFECTS = (
     Effect(
         name="heave_pitch_rate_coupling",
@@ -41,6 +46,19 @@ EFFECTS = (
         scales=("",),
         force=_coupling,
         is_common=True,
+    ),
+    Effect(
+        name="heave_pitch_acceleration_coupling",
+        slot="heave",
+        parameters=(
+            Parameter(name="c_wa", unit="m/rad", lower=-5, upper=5, meaning="pitch acceleration into heave"),
+        ),
+        sentence="Turning the hull throws it sideways: its centre of gravity, or the water it carries along, "
+        "lies ahead or astern of the reference point (m xG + Zq').",
+        equation="w' = ... + c_wa (a2 q + a3 theta + b2 delta)",
+        manoeuvre="quick plane reversals, then climbs and dives held until the pitch has settled",
+        probes=((0.05,), (-0.05,)),
+        force=_acceleration,
     ),
     Effect(
         name="heave_quadratic_drag",

@@ -21,6 +21,10 @@ def _restoring(c: Chain) -> None:
     c.pitch += c.p["restoring_share"] * c.p["a3"] * (ca.sin(c.theta) - c.theta)
 
 
+def _pendulum(c: Chain) -> None:
+    c.pitch -= c.p["c_qu"] * (c.surge + c.q * c.w)
+
+
 EFFECTS = (
     Effect(
         name="pitch_quadratic_damping",
@@ -69,5 +73,16 @@ EFFECTS = (
         probes=((1.0,),),
         force=_restoring,
         is_common=True,
+    ),
+    Effect(
+        name="surge_pitch_coupling",
+        slot="pitch",
+        parameters=(Parameter(name="c_qu", unit="rad/m", lower=-10, upper=10, meaning="surge into pitch"),),
+        sentence="The weight hangs below the centre of buoyancy like a pendulum: it feels the vehicle's own "
+        "acceleration along its axis as it feels gravity (c_qu = m zG/Iy, near -a3/9.81).",
+        equation="q' = ... - c_qu (u' + q w)",
+        manoeuvre="full plane reversals at the highest speed, or changes of thrust with the planes level",
+        probes=((0.1,),),
+        force=_pendulum,
     ),
 )

@@ -12,6 +12,7 @@ def _speed_loss(c: Chain) -> None:
         - c.p["c_ud"] * (c.speed_ratio * c.plane) ** 2
         - c.p["c_uq"] * c.w * c.q
     )
+    c.surge = c.surge + c.rates["speed_loss"] * (1 - is_known)
 
 
 EFFECTS = (

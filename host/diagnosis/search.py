@@ -105,6 +105,10 @@ class Search:
         )
         return dict(zip(others, found, strict=True))
 
+    def growth(self, parent: Explanation, name: str) -> Task:
+        """The fit of a set with one effect, or form of unknown physics, more."""
+        return "grown", (parent, name, self._values(name))
+
     def pruned(self, explanation: Explanation) -> Explanation:
         """The set less the members that do not pay for themselves."""
         while explanation.names:
@@ -144,7 +148,7 @@ class Search:
         tasks: dict[Names, Task] = {}
         for parent in parents:
             for name in self._promising(parent, size, parent is parents[0]):
-                tasks.setdefault(parent.names | {name}, ("grown", (parent, name, self._values(name))))
+                tasks.setdefault(parent.names | {name}, self.growth(parent, name))
         labels = [" + ".join(sorted(names)) for names in tasks]
 
         def say(number: int) -> None:

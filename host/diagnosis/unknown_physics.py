@@ -2,21 +2,25 @@
 
 Few entries of a catalogue can follow nearly anything: drag and a current that cancels a buoyancy are the drag
 on one side of a keel. What gives them away is that one form of unknown physics (host.catalogue.unknown)
-explains the recording better, and with it some of them are no longer needed.
+explains the recording better, and with it some of them are no longer needed. For the same reason a set as
+large as the search goes grows only in competition with these forms.
 """
 
 from host.catalogue import BY_NAME, UNKNOWN
 from host.diagnosis.explanation import Explanation
-from host.diagnosis.search import NAMING_MARGIN, SMALL, Search
+from host.diagnosis.search import FEW, LARGEST_SET, NAMING_MARGIN, SMALL, Search
 
 PROMISING = 2  # forms beside each set that are fitted in earnest
 FAIR_PART = 0.3  # of what a member was worth, that a form in its place must promise: predictions are local
-MOST_ROUNDS = 3
+MOST_ROUNDS = 8
 MOST_TOLD = 3  # coefficients that a sentence can hold
 
 
 def with_unknown(search: Search, best: Explanation) -> Explanation:
-    """The best explanation with forms of unknown physics in it, where they pay as named effects must."""
+    """The best explanation with forms of unknown physics in it, and more effects beside those of a large set.
+
+    Either must pay as any effect does.
+    """
     search.on_progress("physics outside the catalogue")
     for _ in range(MOST_ROUNDS):
         better = min(map(search.pruned, _grown(search, best)), key=lambda e: e.bic, default=best)
@@ -44,8 +48,14 @@ def known_in(explanation: Explanation) -> list[str]:
 
 
 def _grown(search: Search, best: Explanation) -> list[Explanation]:
-    """The set with a form more, beside all its members or in the place of one: the two best."""
-    parents = [best, *(search.without(best, name) for name in sorted(best.names))]
+    """The set with a form more, beside all its members or in the place of one: the two best.
+
+    A large set with another effect more, too; in the place of one of its many members a form says little.
+    """
+    count = len(known_in(best))
+    parents = [best]
+    if count <= LARGEST_SET:
+        parents += [search.without(best, name) for name in sorted(best.names)]
     found = search.workers.results([("form_gains", (parent,)) for parent in parents])
     chosen = {}
     for parent, gains in zip(parents, found, strict=True):
@@ -54,7 +64,12 @@ def _grown(search: Search, best: Explanation) -> list[Explanation]:
         likely = sorted((name for name in gains if gains[name] > least), key=lambda name: -gains[name])
         for name in likely[: PROMISING if len(best.names) <= SMALL else 1]:
             chosen[parent.names | {name}] = parent, name
-    grown = search.workers.results([("grown", (parent, name, [])) for parent, name in chosen.values()])
+    if count >= LARGEST_SET:
+        gains = search.gains(best, is_thorough=False)
+        for name in sorted(gains, key=lambda name: -gains[name])[:FEW]:
+            if gains[name] > search.margin(best):
+                chosen[best.names | {name}] = best, name
+    grown = search.workers.results([search.growth(parent, name) for parent, name in chosen.values()])
     polished = search.workers.results([("polished", (e,)) for e in grown])
     count = 2 if len(best.names) <= SMALL else 1
     return [search.remember(e) for e in sorted(polished, key=lambda e: e.bic)[:count]]
