@@ -97,7 +97,7 @@ def compare(fitter: Fitter, own: Explanation, other: Side) -> Comparison:
     effects = []
     for name in joint.names:
         mine = _of(name, recorded)
-        worth = fitter.shrunk(joint, name).bic - joint.bic
+        worth = fitter.polished(fitter.shrunk(joint, name)).bic - joint.bic
         if name not in other.names:
             effects.append(
                 EffectDifference(name=name, status="missing", recorded=mine, given={}, evidence=worth)
@@ -129,7 +129,7 @@ def _in_words_of(fitter: Fitter, own: Explanation, other: Side) -> Explanation:
         start = np.array([value for value, _ in _of(name, other.values).values()])
         joint = fitter.polished(fitter.grown(joint, name, [start]))
     for _ in own.names - other.names:
-        fewer = [fitter.shrunk(joint, name) for name in joint.names - other.names]
+        fewer = [fitter.polished(fitter.shrunk(joint, name)) for name in joint.names - other.names]
         leanest = min(fewer, key=lambda explanation: explanation.bic, default=joint)
         if leanest is joint or leanest.bic > joint.bic + NAMING_MARGIN:
             break

@@ -162,13 +162,13 @@ class Fitter:
         return form_gains(self, parent)
 
     def shrunk(self, parent: Explanation, name: str) -> Explanation:
-        """The parent's set without one of its effects."""
+        """The parent's set without one of its effects; not polished."""
         names = parent.names - {name}
         start = self.point(names, parent)
         starts = [start]
         if self.excess(parent.fit) > FAR:
             starts.append(self._guess(start, names))
-        return self.polished(self._explained(names, self._fit(starts)))
+        return self._explained(names, self._fit(starts))
 
     def polished(self, explanation: Explanation) -> Explanation:
         """The same set, its fit carried on until nothing more is gained."""

@@ -94,12 +94,14 @@ class Search:
     def without(self, best: Explanation, name: str) -> Explanation:
         """The set less one member."""
         if best.names - {name} not in self.tried:
-            self.remember(self.fitter.shrunk(best, name))
+            self.remember(self.fitter.polished(self.fitter.shrunk(best, name)))
         return self.tried[best.names - {name}]
 
-    def gains(self, parent: Explanation, is_thorough: bool = True) -> dict[str, float]:
+    def gains(
+        self, parent: Explanation, is_thorough: bool = True, among: set[str] | None = None
+    ) -> dict[str, float]:
         """Twice the log-likelihood each effect could gain on top of the parent, predicted."""
-        others = _candidates(parent)
+        others = [name for name in _candidates(parent) if among is None or name in among]
         found = self.workers.results(
             [("gain", (parent, name, self._values(name), is_thorough)) for name in others]
         )
@@ -118,9 +120,13 @@ class Search:
                 for names, member in smaller.items()
                 if names not in self._shrunk
             ]
-            for found in self.workers.results(tasks):
-                self.remember(found)
-                self._shrunk.add(found.names)
+            found = self.workers.results(tasks)
+            # What a rough fit loses by far is needed; what it hardly loses must be known well.
+            close = [e for e in found if e.bic < explanation.bic + self.margin(explanation) + ROUGH]
+            found += self.workers.results([("polished", (e,)) for e in close])
+            for one in found:
+                self.remember(one)
+                self._shrunk.add(one.names)
             leanest = min((self.tried[names] for names in smaller), key=lambda e: e.bic)
             if leanest.bic > explanation.bic + self.margin(explanation):
                 break
@@ -189,8 +195,8 @@ class Search:
         best = self._retrimmed()
         for _ in range(MOST_ROUNDS):
             best = self.pruned(best)
-            rival = self._exchanged(best, [self.without(best, member) for member in sorted(best.names)])
-            if rival is None:
+            rival = self.exchanged(best)
+            if rival is best:
                 break
             best = rival
             if len(best.names) > SMALL:
@@ -222,23 +228,25 @@ class Search:
             for names, smaller in self.tried.items()
         )
 
-    def _exchanged(self, best: Explanation, fewer: list[Explanation]) -> Explanation | None:
-        """The best set with one member exchanged for another, where that is better still."""
+    def exchanged(self, best: Explanation) -> Explanation:
+        """The best set with one member exchanged for another, where that is better still; else itself."""
+        fewer = [self.without(best, member) for member in sorted(best.names)]
         tasks: dict[Names, Task] = {}
-        is_small = len(best.names) <= SMALL
+        is_small, is_large = len(best.names) <= SMALL, len(best.names) > LARGEST_SET
         for smaller in fewer:
             (member,) = best.names - smaller.names
-            gains = self.gains(smaller, is_small)
+            kin = {e.name for e in CATALOGUE if self._is_kin(e.name, member)}
+            gains = self.gains(smaller, is_small, kin if is_large else None)
             worth = smaller.bic - best.bic
             likely = [name for name in gains if gains[name] > 0.5 * worth]
             rivals = set(sorted(likely, key=lambda name: -gains[name])[: RIVALS if is_small else FEW])
-            kin = {name for name in gains if self._is_kin(name, member)}
+            kin &= gains.keys()
             rivals |= kin if is_small else {name for name in kin if is_time(named(name))}
             for name in sorted(rivals - best.names):
                 if smaller.names | {name} in self._rivals:
                     continue
                 self._rivals.add(smaller.names | {name})
-                beside = best if self._is_kin(name, member) else None
+                beside = best if name in kin else None
                 tasks[smaller.names | {name}] = ("grown", (smaller, name, self._values(name), beside))
         grown = [self.remember(e) for e in self.workers.results(list(tasks.values()))]
         # Twins may lie at the far end of a curved valley, where a short fit does not come.
@@ -250,7 +258,7 @@ class Search:
         close = [e for e in close if e.bic < best.bic + self.margin(best)]
         leaner = (self.pruned(e) if 1 < len(e.names) <= SMALL else e for e in close)
         rival = min(leaner, key=lambda e: e.bic, default=best)
-        return rival if rival.bic < best.bic - 0.01 else None
+        return rival if rival.bic < best.bic - 0.01 else best
 
     def _is_kin(self, name: str, member: str) -> bool:
         """Whether prediction may misjudge its gain: both delay, or they share an end of the chain and pay."""

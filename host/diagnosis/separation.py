@@ -67,7 +67,9 @@ def separations(found: Diagnosis, on_progress: Progress = lambda _: None) -> lis
     for effect in found.effects:
         if effect.name not in found.extended.names:
             continue
-        without = fitter.shrunk(found.extended, effect.name) if effect.twins else found.extended
+        without = found.extended
+        if effect.twins:
+            without = fitter.polished(fitter.shrunk(found.extended, effect.name))
         for twin in effect.twins:
             on_progress(f"manoeuvre to tell {effect.name} from {twin}")
             rival = fitter.polished(fitter.grown(without, twin, []))

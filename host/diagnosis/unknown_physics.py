@@ -23,11 +23,14 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
     """
     search.on_progress("physics outside the catalogue")
     for _ in range(MOST_ROUNDS):
-        better = min(map(search.pruned, _grown(search, best)), key=lambda e: e.bic, default=best)
+        grown = _grown(search, best)
+        # Of a large set each member costs a long fit to try without: that waits until all have joined.
+        leaner = grown if _is_large(best) else map(search.pruned, grown)
+        better = min(leaner, key=lambda e: e.bic, default=best)
         if better.bic > best.bic - search.margin(better):
             break
         best = better
-    return best
+    return search.exchanged(search.pruned(best)) if _is_large(best) else best
 
 
 def unknown_in(explanation: Explanation) -> list[str]:
@@ -47,14 +50,17 @@ def known_in(explanation: Explanation) -> list[str]:
     return [name for name in BY_NAME if name in explanation.names]
 
 
+def _is_large(explanation: Explanation) -> bool:
+    return len(explanation.names) > LARGEST_SET
+
+
 def _grown(search: Search, best: Explanation) -> list[Explanation]:
     """The set with a form more, beside all its members or in the place of one: the two best.
 
     A large set with another effect more, too; in the place of one of its many members a form says little.
     """
-    count = len(known_in(best))
     parents = [best]
-    if count <= LARGEST_SET:
+    if not _is_large(best):
         parents += [search.without(best, name) for name in sorted(best.names)]
     found = search.workers.results([("form_gains", (parent,)) for parent in parents])
     chosen = {}
@@ -64,7 +70,7 @@ def _grown(search: Search, best: Explanation) -> list[Explanation]:
         likely = sorted((name for name in gains if gains[name] > least), key=lambda name: -gains[name])
         for name in likely[: PROMISING if len(best.names) <= SMALL else 1]:
             chosen[parent.names | {name}] = parent, name
-    if count >= LARGEST_SET:
+    if len(known_in(best)) >= LARGEST_SET:
         gains = search.gains(best, is_thorough=False)
         for name in sorted(gains, key=lambda name: -gains[name])[:FEW]:
             if gains[name] > search.margin(best):
