@@ -84,5 +84,6 @@ EFFECTS = (
         manoeuvre="full plane reversals at the highest speed, or changes of thrust with the planes level",
         probes=((0.1,),),
         force=_pendulum,
+        is_common=True,
     ),
 )

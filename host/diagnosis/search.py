@@ -4,6 +4,8 @@ Effects are never added one at a time for good: sets are carried side by side, e
 re-estimated with the base whenever one joins, members that no longer pay are dropped, and each member of the
 best set is exchanged for every other effect that might do its work. Each effect is fitted alone; what it
 could gain beside others is predicted by one Gauss-Newton step from there, and the promising ones are fitted.
+Where few effects leave much, what every vehicle has is fitted together and pruned: of many that act at once,
+each may look idle or be mistaken until the others are there.
 """
 
 from collections.abc import Callable
@@ -60,6 +62,8 @@ class Search:
             self.remember(explanation)
         beam = [self.remember(self.root)]
         for size in range(1, LARGEST_SET + 1):
+            if size == SMALL and self._is_ordinary(beam[0]):
+                break
             grown = self._grown(beam, size)
             best_before = min(e.bic for e in beam)
             beam = self._parents(grown)[: BEAM if size == 1 else NARROW]
@@ -113,8 +117,9 @@ class Search:
 
     def pruned(self, explanation: Explanation) -> Explanation:
         """The set less the members that do not pay for themselves."""
-        while explanation.names:
-            smaller = {explanation.names - {member}: member for member in sorted(explanation.names)}
+        doubtful = set(explanation.names)
+        while doubtful:
+            smaller = {explanation.names - {member}: member for member in sorted(doubtful)}
             tasks: list[Task] = [
                 ("shrunk", (explanation, member))
                 for names, member in smaller.items()
@@ -130,6 +135,10 @@ class Search:
             leanest = min((self.tried[names] for names in smaller), key=lambda e: e.bic)
             if leanest.bic > explanation.bic + self.margin(explanation):
                 break
+            # What is clearly needed beside others is needed without them.
+            limit = explanation.bic + self.margin(explanation) + ROUGH
+            doubtful = {smaller[names] for names in smaller if self.tried[names].bic < limit}
+            doubtful &= leanest.names
             explanation = leanest
         return explanation
 
@@ -143,6 +152,21 @@ class Search:
     def margin(self, explanation: Explanation) -> float:
         """What a member must gain beside this set: correlated residuals repeat each other's evidence."""
         return NAMING_MARGIN * correlation_factor(explanation.fit.whitened)
+
+    def _is_ordinary(self, leading: Explanation) -> bool:
+        """Whether all that every vehicle has, tried if the leading small set leaves much, leaves little."""
+        if self.root.fit.has_process_noise or self.fitter.excess(leading.fit) < NEAR:
+            return False
+        ordinary = [e.name for e in CATALOGUE if e.is_common and e.name not in OFFSETS]
+        family = self.root.names | {*ordinary}
+        fitted = [e for e in self.tried.values() if self.root.names <= e.names <= family]
+        joint = min(fitted, key=lambda e: e.bic)
+        self.on_progress("what every vehicle has")
+        for name in ordinary:
+            if name not in joint.names:
+                joint = self.fitter.grown(joint, name, self._values(name))
+        joint = self.pruned(self.remember(self.fitter.polished(joint)))
+        return joint.bic < leading.bic and self.fitter.excess(joint.fit) < NEAR
 
     def _parents(self, grown: list[Explanation]) -> list[Explanation]:
         """The best sets, as far as they explain a fair part of what the very best does."""
@@ -211,6 +235,8 @@ class Search:
         polished = [self.remember(e) for e in self.workers.results([("polished", (e,)) for e in rough])]
         leading = min(polished, key=lambda e: e.bic)
         polished = [e for e in polished if e.bic < leading.bic + 2.0 * NAMING_MARGIN]
+        if len(leading.names) > LARGEST_SET:
+            polished = [leading]
         explained = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
         for counts in ((0, 1), (2,)):
             ways = [frozenset(way) for count in counts for way in combinations(OFFSETS, count)]
