@@ -151,7 +151,9 @@ class Fitter:
             starts = [starts[0], self._guess(starts[0], names)]
         if rival is not None:
             starts += [self.point(names, rival, name, probe) for _, probe in likely[:2]]
-            starts += [self.point(names, rival, name, probe) for probe in _same_time(rival, parent, name)]
+            starts += [
+                self.point(names, rival, name, probe) for probe in self._same_size(rival, parent, name)
+            ]
         return self._explained(names, self._fit(starts))
 
     def gain(self, parent: Explanation, name: str, values: list[Array], is_thorough: bool) -> float:
@@ -249,6 +251,19 @@ class Fitter:
         on = Point(structure, best.parameters, best.initial, best.noise)
         return output_error(on, inputs, free, MOST_ITERATIONS, TOLERANCE)
 
+    def _same_size(self, rival: Explanation, parent: Explanation, name: str) -> list[Array]:
+        """A start of an effect where the one that the rival has in its place ended, if these measure alike.
+
+        Of two limits of the plane each is blind but near the right angle.
+        """
+        (other,) = rival.names - parent.names
+        effect, its = named(name), named(other)
+        if not measure_alike(effect, its):
+            return []
+        value = rival.fit.parameters[rival.fit.structure.names.index(its.parameters[0].name)]
+        scales = [self.scales[scale] for scale in (effect.scales or ("",) * len(effect.parameters))]
+        return [np.array([value, *(np.array(effect.probes[0]) * scales)[1:]])]
+
     def _carried_on(self, start: Point) -> Fit:
         names = frozenset(effect.name for effect in start.structure.effects)
         inputs, free = self.inputs(names), self.free(names)
@@ -264,13 +279,11 @@ def is_time(effect: Effect) -> bool:
     return [parameter.unit for parameter in effect.parameters] == ["s"]
 
 
-def _same_time(rival: Explanation, parent: Explanation, name: str) -> list[Array]:
-    """The time constant of the effect that the rival has and the parent has not, for another of one."""
-    (other,) = rival.names - parent.names
-    if not all(is_time(named(one)) for one in (other, name)):
-        return []
-    fit = rival.fit
-    return [fit.parameters[[fit.structure.names.index(named(other).parameters[0].name)]]]
+def measure_alike(one: Effect, other: Effect) -> bool:
+    """Whether the first parameter of one suits the other: both delay, or share a slot and the unit."""
+    if is_time(one) and is_time(other):
+        return True
+    return (one.slot, one.parameters[0].unit) == (other.slot, other.parameters[0].unit)
 
 
 def _first(values: Array) -> float:

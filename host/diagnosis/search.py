@@ -16,7 +16,7 @@ from math import log
 from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, named
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation, Names
-from host.diagnosis.fitter import Fitter, is_time
+from host.diagnosis.fitter import Fitter, is_time, measure_alike
 from host.diagnosis.workers import Task, Workers
 from host.recording import Array
 from host.whiteness import correlation_factor
@@ -287,10 +287,10 @@ class Search:
         return rival if rival.bic < best.bic - 0.01 else best
 
     def _is_kin(self, name: str, member: str) -> bool:
-        """Whether prediction may misjudge its gain: both delay, or they share an end of the chain and pay."""
+        """Whether prediction may misjudge its gain: they measure alike, or share an end of it and pay."""
         if name == member:
             return False
-        if all(is_time(named(one)) for one in (name, member)):
+        if measure_alike(named(name), named(member)):
             return True
         alone = self.tried.get(self.root.names | {name})
         pays = alone is not None and alone.bic < self.root.bic - NAMING_MARGIN
