@@ -22,6 +22,18 @@ UNKNOWN = {effect.name: effect for effect in unknown.FORMS}
 _ALL = BY_NAME | UNKNOWN | {e.name: e for e in (nuisance.FREE_TRIM, unknown.ANY_SMOOTH_FORCE)}
 OFFSETS = ("net_buoyancy", "trim_moment", "rudder_offset", "pitch_bias", "vertical_current")
 """Effects that do no more than shift the steady state, as nuisance.FREE_TRIM does without saying why."""
+ORDINARY = (
+    "heave_pitch_rate_coupling",
+    "large_angle_kinematics",
+    "speed_loss",
+    "munk_moment",
+    "actuator_lag",
+    "large_angle_restoring",
+    "heave_quadratic_drag",
+    "pitch_quadratic_damping",
+    "surge_pitch_coupling",
+)
+"""What acts on every vehicle, strong or weak, beside an imperfect trim: the largest part first."""
 
 
 def named(name: str) -> Effect:

@@ -2,10 +2,10 @@
 
 import casadi as ca
 
+from host.catalogue.gravity import GRAVITY
 from host.catalogue.oscillation import oscillation, oscillation_parameters
 from host.equations import Chain, Effect, Parameter
 
-GRAVITY = 9.80665  # m/s^2
 INTERNAL_PERIODS = (15.0, 20000.0)  # s
 WAVE_PERIODS = (2.0, 20.0)  # s
 

@@ -51,7 +51,7 @@ EFFECTS = (
         name="heave_pitch_acceleration_coupling",
         slot="heave",
         parameters=(
-            Parameter(name="c_wa", unit="m/rad", lower=-5, upper=5, meaning="pitch acceleration into heave"),
+            Parameter(name="c_wa", unit="m/rad", lower=-1, upper=1, meaning="pitch acceleration into heave"),
         ),
         sentence="Turning the hull throws it sideways: its centre of gravity, or the water it carries along, "
         "lies ahead or astern of the reference point (m xG + Zq').",

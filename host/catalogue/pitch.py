@@ -2,6 +2,7 @@
 
 import casadi as ca
 
+from host.catalogue.gravity import GRAVITY
 from host.equations import Chain, Effect, Parameter
 
 
@@ -22,7 +23,7 @@ def _restoring(c: Chain) -> None:
 
 
 def _pendulum(c: Chain) -> None:
-    c.pitch -= c.p["c_qu"] * (c.surge + c.q * c.w)
+    c.pitch += c.p["pendulum_share"] * c.p["a3"] / GRAVITY * (c.surge + c.q * c.w)
 
 
 EFFECTS = (
@@ -77,13 +78,14 @@ EFFECTS = (
     Effect(
         name="surge_pitch_coupling",
         slot="pitch",
-        parameters=(Parameter(name="c_qu", unit="rad/m", lower=-10, upper=10, meaning="surge into pitch"),),
+        parameters=(
+            Parameter(name="pendulum_share", unit="1", lower=0, upper=3, meaning="1 is that of the weight"),
+        ),
         sentence="The weight hangs below the centre of buoyancy like a pendulum: it feels the vehicle's own "
-        "acceleration along its axis as it feels gravity (c_qu = m zG/Iy, near -a3/9.81).",
-        equation="q' = ... - c_qu (u' + q w)",
+        "acceleration along its axis as it feels gravity.",
+        equation="q' = a2 q + a3 [theta + pendulum_share (u' + q w)/g] + ...",
         manoeuvre="full plane reversals at the highest speed, or changes of thrust with the planes level",
-        probes=((0.1,),),
+        probes=((1.0,),),
         force=_pendulum,
-        is_common=True,
     ),
 )

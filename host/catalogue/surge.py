@@ -34,6 +34,5 @@ EFFECTS = (
         force=_speed_loss,
         state="speed_loss",
         initial=lambda c: 0 * c.zeta,
-        is_common=True,
     ),
 )

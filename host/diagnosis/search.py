@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from math import log
 
-from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, named
+from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, ORDINARY, named
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter, is_time, measure_alike
@@ -157,12 +157,11 @@ class Search:
         """Whether all that every vehicle has, tried if the leading small set leaves much, leaves little."""
         if self.root.fit.has_process_noise or self.fitter.excess(leading.fit) < NEAR:
             return False
-        ordinary = [e.name for e in CATALOGUE if e.is_common and e.name not in OFFSETS]
-        family = self.root.names | {*ordinary}
+        family = self.root.names | {*ORDINARY}
         fitted = [e for e in self.tried.values() if self.root.names <= e.names <= family]
         joint = min(fitted, key=lambda e: e.bic)
         self.on_progress("what every vehicle has")
-        for name in ordinary:
+        for name in ORDINARY:
             if name not in joint.names:
                 joint = self.fitter.grown(joint, name, self._values(name))
         joint = self.pruned(self.remember(self.fitter.polished(joint)))

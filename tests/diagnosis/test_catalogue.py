@@ -52,13 +52,13 @@ def test_effect_acts_and_its_sensitivities_are_exact(name: str) -> None:
 
 
 def test_a_low_centre_of_gravity_feels_a_change_of_speed() -> None:
-    # With the planes level and no heave only the surge acceleration turns the vehicle: a3 theta = c_qu u'.
+    # With the planes level and no heave only the surge acceleration turns the vehicle: theta = -u'/g.
     still = hidden_dive(duration=30.0)
     ramp = replace(still, rudder=np.zeros(still.time.size), speed=2.0 + 0.05 * still.time)
     inputs = inputs_of(ramp, structure_of(("surge_pitch_coupling",)))
-    run = free_run(np.array([*BASE.values(), 0.0, 0.0, 0.8]), np.array([0.0, 0.0, 0.0, 20.0]), inputs)
+    run = free_run(np.array([*BASE.values(), 0.0, 0.0, 1.0]), np.array([0.0, 0.0, 0.0, 20.0]), inputs)
     settled = run.outputs[0, 150:250]
-    np.testing.assert_allclose(settled, 0.8 * 0.05 / BASE["a3"], rtol=0.02)
+    np.testing.assert_allclose(settled, -0.05 / 9.80665, rtol=0.02)
 
 
 def test_an_unknown_effect_is_a_key_error() -> None:

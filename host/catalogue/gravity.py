@@ -1,0 +1,3 @@
+"""Standard gravity."""
+
+GRAVITY = 9.80665  # m/s^2
