@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal
+from math import inf
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, UNKNOWN, named
+from host.catalogue import BY_NAME, CATALOGUE, UNKNOWN, named
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import SEA_DOUBT, Leftover, leftover
@@ -14,8 +15,8 @@ from host.diagnosis.locate import Location, locate
 from host.diagnosis.noise_floor import noise_floor
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.search import Search
-from host.diagnosis.seas import WAVES, among_waves, in_a_sea
-from host.diagnosis.spans import Spans, divide
+from host.diagnosis.seas import WAVES, Waves, among_waves, in_a_sea
+from host.diagnosis.spans import Spans, divide, excerpt
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.unknown_physics import known_in, unknown_in, with_unknown
 from host.diagnosis.workers import Workers
@@ -69,6 +70,15 @@ class Diagnosis:
     std: dict[str, float] = field(default_factory=dict)
 
 
+class Explained(NamedTuple):
+    """The best explanation, the search that found it, what it leaves, and the waves it was found among."""
+
+    best: Explanation
+    search: Search
+    left: Leftover
+    waves: Waves | None
+
+
 def diagnose(
     recordings: list[Recording], on_progress: Callable[[str], None] = lambda _: None, jobs: int = 1
 ) -> Diagnosis:
@@ -80,20 +90,17 @@ def diagnose(
     floor = noise_floor(recordings)
     spans = divide(recordings)
     on_progress("base model")
+    part, teaching = None, excerpt(spans.teaching)
+    if teaching is not spans.teaching:
+        on_progress("an excerpt")
+        fitter = Fitter(teaching)
+        with Workers(fitter, jobs) as workers:
+            part = _explain(fitter, workers, on_progress)
+        on_progress("the whole")
     fitter = Fitter(spans.teaching)
     with Workers(fitter, jobs) as workers:
-        search = Search(fitter, workers, on_progress, fitter.base, fitter.trimmed())
-        best = search.run()
-        left = leftover(fitter, best)
-        if best.names or not left.is_nothing:
-            best = with_unknown(search, best)
-            left = leftover(fitter, best)
-        waves, model = None, best
-        if unknown_in(best) or not left.is_nothing:
-            search, best = in_a_sea(search, best)
-            search, best, waves = among_waves(search, best)
-            left = leftover(fitter, best if waves is None else waves.fitted)
-            model = best if waves is None else waves.model
+        best, search, left, waves = _explain(fitter, workers, on_progress, part)
+        model = best if waves is None else waves.model
         on_progress("held-out check")
         before, after = misfit(search.base, spans, floor), misfit(model, spans, floor)
         effects = [_named(search, best, name, spans, floor, after) for name in known_in(best)]
@@ -130,6 +137,25 @@ def diagnose(
         bic=best.bic,
         std=std,
     )
+
+
+def _explain(
+    fitter: Fitter, workers: Workers, on_progress: Callable[[str], None], part: Explained | None = None
+) -> Explained:
+    """Searches for the best explanation, or goes on from that of a part, where most has been settled."""
+    known = None if part is None else part.search
+    search = Search(fitter, workers, on_progress, fitter.base, fitter.trimmed(), known)
+    best = search.run([] if part is None else [fitter.refitted(part.best)])
+    left, waves = leftover(fitter, best), None
+    if best.names or not left.is_nothing:
+        best = with_unknown(search, best)
+        left = leftover(fitter, best)
+    may_be_sea = part is None or part.best.fit.has_process_noise
+    if may_be_sea and (unknown_in(best) or not left.is_nothing):
+        search, best = in_a_sea(search, best)
+        search, best, waves = among_waves(search, best)
+        left = leftover(fitter, best if waves is None else waves.fitted)
+    return Explained(best, search, left, waves)
 
 
 def _named(
@@ -191,17 +217,8 @@ def _slots(
 
 def _ranking(search: Search) -> list[tuple[str, float]]:
     """What each effect alone improves the information criterion by, best first."""
-    alone = [
-        (effect.name, search.root.bic - search.tried[search.root.names | {effect.name}].bic)
-        for effect in CATALOGUE
-        if search.root.names | {effect.name} in search.tried
-    ]
-    alone += [
-        (name, search.base.bic - search.tried[frozenset({name})].bic)
-        for name in OFFSETS
-        if frozenset({name}) in search.tried
-    ]
-    return sorted(alone, key=lambda pair: -pair[1])
+    alone = [(effect.name, search.gain_alone(effect.name)) for effect in CATALOGUE]
+    return sorted((pair for pair in alone if pair[1] > -inf), key=lambda pair: -pair[1])
 
 
 def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit) -> str:

@@ -11,7 +11,7 @@ each may look idle or be mistaken until the others are there.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
-from math import log
+from math import inf, log
 
 from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, ORDINARY, named
 from host.catalogue.nuisance import FREE_TRIM
@@ -45,6 +45,7 @@ class Search:
 
     base  the paper's equations alone, `root` the same with a free trim; all that is tried grows from it, with
           random forces where the root has them
+    part  the search over an excerpt of the recordings that this one goes on from
     """
 
     fitter: Fitter
@@ -52,6 +53,7 @@ class Search:
     on_progress: Progress
     base: Explanation
     root: Explanation
+    part: "Search | None" = None
     tried: dict[Names, Explanation] = field(default_factory=dict)
     _rivals: set[Names] = field(default_factory=set)  # those fitted in the place of another
     _shrunk: set[Names] = field(default_factory=set)  # those fitted to the end from a larger set
@@ -61,6 +63,9 @@ class Search:
         for explanation in (self.base, *(also or [])):
             self.remember(explanation)
         beam = [self.remember(self.root)]
+        if self.part is not None:
+            settled = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
+            return self._settled(min(settled, key=lambda e: e.bic))
         for size in range(1, LARGEST_SET + 1):
             if size == SMALL and self._is_ordinary(beam[0]):
                 break
@@ -69,7 +74,8 @@ class Search:
             beam = self._parents(grown)[: BEAM if size == 1 else NARROW]
             if not beam or beam[0].bic > best_before - self.margin(beam[0]):
                 break
-        return self._settled()
+        self.on_progress("settling")
+        return self._settled(self._retrimmed())
 
     def twins(self, best: Explanation, name: str) -> list[str]:
         """The effects that would do the work of one member as well, or nearly: the two closest.
@@ -100,6 +106,20 @@ class Search:
         if best.names - {name} not in self.tried:
             self.remember(self.fitter.polished(self.fitter.shrunk(best, name)))
         return self.tried[best.names - {name}]
+
+    def gain_alone(self, name: str) -> float:
+        """What the effect alone takes off the BIC: of the root, of the base if an offset; -inf if untried."""
+        if self.part is not None:
+            return self.part.gain_alone(name)
+        for start in (self.root, self.base):
+            if start.names | {name} in self.tried:
+                return start.bic - self.tried[start.names | {name}].bic
+        return -inf
+
+    def _alone(self, name: str) -> Explanation | None:
+        if self.part is not None:
+            return self.part._alone(name)
+        return self.tried.get(frozenset({name, FREE_TRIM.name}), self.tried.get(frozenset({name})))
 
     def gains(
         self, parent: Explanation, is_thorough: bool = True, among: set[str] | None = None
@@ -205,17 +225,15 @@ class Search:
 
     def _values(self, name: str) -> list[Array]:
         """Where a fit of this effect alone ended: a better start than its probes."""
-        alone = self.tried.get(frozenset({name, FREE_TRIM.name}), self.tried.get(frozenset({name})))
+        alone = self._alone(name)
         if alone is None:
             return []
         fit = alone.fit
         own = [fit.structure.names.index(p.name) for p in named(name).parameters]
         return [fit.parameters[own]]
 
-    def _settled(self) -> Explanation:
-        """Prunes and exchanges members of the best set until neither helps."""
-        self.on_progress("settling")
-        best = self._retrimmed()
+    def _settled(self, best: Explanation) -> Explanation:
+        """Prunes and exchanges members of the set until neither helps."""
         for _ in range(MOST_ROUNDS):
             best = self.pruned(best)
             rival = self.exchanged(best)
@@ -291,8 +309,7 @@ class Search:
             return False
         if measure_alike(named(name), named(member)):
             return True
-        alone = self.tried.get(self.root.names | {name})
-        pays = alone is not None and alone.bic < self.root.bic - NAMING_MARGIN
+        pays = self.gain_alone(name) > NAMING_MARGIN
         slots = {named(name).slot, named(member).slot}
         return pays and (len(slots) == 1 or slots == {"actuator", "sensor"})
 

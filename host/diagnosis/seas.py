@@ -36,7 +36,7 @@ def in_a_sea(calm: Search, best: Explanation) -> tuple[Search, Explanation]:
     root, also = fitter.with_sea(calm.root), fitter.with_sea(best)
     if min(root.bic, also.bic) > best.bic - NAMING_MARGIN:
         return calm, best
-    rough = Search(fitter, calm.workers, calm.on_progress, fitter.with_sea(calm.base), root)
+    rough = Search(fitter, calm.workers, calm.on_progress, fitter.with_sea(calm.base), root, calm.part)
     found = rough.run([also])
     return (rough, found) if found.bic < best.bic else (calm, best)
 
@@ -59,7 +59,7 @@ def among_waves(rough: Search, best: Explanation) -> tuple[Search, Explanation, 
     if first.bic > best.bic - NAMING_MARGIN or not WAVE_PERIODS[0] < period < WAVE_PERIODS[1]:
         return rough, best, None
     base, root = (fitter.with_waves(one, first.fit) for one in (rough.base, rough.root))
-    search = Search(fitter, rough.workers, rough.on_progress, base, root)
+    search = Search(fitter, rough.workers, rough.on_progress, base, root, rough.part)
     found = search.run([first])
     fitted = first if found.names == first.names else fitter.with_waves(found)
     model = fitter.with_regular_waves(fitted, white.fit)

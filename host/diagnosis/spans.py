@@ -11,6 +11,7 @@ SHORTEST_DIVIDED = 48.0  # s; a shorter recording judges as a whole or not at al
 SHORTEST_SPAN = 8.0  # s; a free run over less says little
 JUDGING_SHARE = 0.1  # of a recording, in each of two spans
 LONGEST_RUN = 600.0  # s; a teaching run starts anew after so long, or the smallest drift would rule it
+LONG, EXCERPT = 15000, 4000  # rows of all teaching runs: from how many on a search looks at so many first
 LEAST_MEASURED = 20  # values of each channel, for a span to be of use
 
 
@@ -57,6 +58,20 @@ def divide(recordings: list[Recording]) -> Spans:
                 teaching.append(run)
                 unseen.append(_less(whole, run))
     return Spans(teaching, judging, unseen if judging else [])
+
+
+def excerpt(teaching: list[Recording]) -> list[Recording]:
+    """Of long recordings a piece of each run, the one in which the plane moves most; else all."""
+    rows = sum(run.time.size for run in teaching)
+    if rows <= LONG:
+        return teaching
+    count = int(np.ceil(rows / EXCERPT))
+    pieces = []
+    for run in teaching:
+        edges = np.linspace(run.time[0], run.time[-1] + run.step, count + 1)
+        parts = [run.between(float(start), float(end)) for start, end in pairwise(edges)]
+        pieces.append(max(parts, key=lambda part: float(np.std(part.rudder)) * _is_measured(part)))
+    return pieces
 
 
 def _is_measured(recording: Recording) -> bool:

@@ -22,7 +22,7 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
     Either must pay as any effect does.
     """
     search.on_progress("physics outside the catalogue")
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MOST_ROUNDS if search.part is None else 1):
         grown = _grown(search, best)
         # Of a large set each member costs a long fit to try without: that waits until all have joined.
         leaner = grown if _is_large(best) else map(search.pruned, grown)
