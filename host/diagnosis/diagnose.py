@@ -103,7 +103,7 @@ def diagnose(
         model = best if waves is None else waves.model
         on_progress("held-out check")
         before, after = misfit(search.base, spans, floor), misfit(model, spans, floor)
-        effects = [_named(search, best, name, spans, floor, after) for name in known_in(best)]
+        effects = _named(search, best, spans, floor, after)
         if waves is not None and WAVES not in best.names:
             effects.append(NamedEffect(name=WAVES, delta_bic=waves.delta_bic))
         effects.sort(key=lambda effect: -effect.delta_bic)
@@ -158,16 +158,17 @@ def _explain(
     return Explained(best, search, left, waves)
 
 
-def _named(
-    search: Search, best: Explanation, name: str, spans: Spans, floor: Array, after: Misfit
-) -> NamedEffect:
-    without = search.without(best, name)
-    return NamedEffect(
-        name=name,
-        delta_bic=without.bic - best.bic,
-        heldout_gain=1.0 - after.chi2 / misfit(without, spans, floor).chi2,
-        twins=search.twins(best, name),
-    )
+def _named(search: Search, best: Explanation, spans: Spans, floor: Array, after: Misfit) -> list[NamedEffect]:
+    names = known_in(best)
+    return [
+        NamedEffect(
+            name=name,
+            delta_bic=without.bic - best.bic,
+            heldout_gain=1.0 - after.chi2 / misfit(without, spans, floor).chi2,
+            twins=search.twins(best, name),
+        )
+        for name, without in zip(names, search.each_without(best, names), strict=True)
+    ]
 
 
 def _with_coefficients(effect: NamedEffect, values: dict[str, float], std: dict[str, float]) -> NamedEffect:

@@ -67,7 +67,7 @@ class Search:
             settled = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
             return self._settled(min(settled, key=lambda e: e.bic))
         for size in range(1, LARGEST_SET + 1):
-            if size == SMALL and self._is_ordinary(beam[0]):
+            if size == SMALL and self._ordinary_suffices(beam[0]):
                 break
             grown = self._grown(beam, size)
             best_before = min(e.bic for e in beam)
@@ -103,9 +103,15 @@ class Search:
 
     def without(self, best: Explanation, name: str) -> Explanation:
         """The set less one member."""
-        if best.names - {name} not in self.tried:
-            self.remember(self.fitter.polished(self.fitter.shrunk(best, name)))
-        return self.tried[best.names - {name}]
+        return self.each_without(best, [name])[0]
+
+    def each_without(self, best: Explanation, members: list[str]) -> list[Explanation]:
+        """The set less each of these members."""
+        missing = [name for name in members if best.names - {name} not in self.tried]
+        rough = self.workers.results([("shrunk", (best, name)) for name in missing])
+        for explanation in self.workers.results([("polished", (e,)) for e in rough]):
+            self.remember(explanation)
+        return [self.tried[best.names - {name}] for name in members]
 
     def gain_alone(self, name: str) -> float:
         """What the effect alone takes off the BIC: of the root, of the base if an offset; -inf if untried."""
@@ -173,7 +179,7 @@ class Search:
         """What a member must gain beside this set: correlated residuals repeat each other's evidence."""
         return NAMING_MARGIN * correlation_factor(explanation.fit.whitened)
 
-    def _is_ordinary(self, leading: Explanation) -> bool:
+    def _ordinary_suffices(self, leading: Explanation) -> bool:
         """Whether all that every vehicle has, tried if the leading small set leaves much, leaves little."""
         if self.root.fit.has_process_noise or self.fitter.excess(leading.fit) < NEAR:
             return False
@@ -273,7 +279,7 @@ class Search:
 
     def exchanged(self, best: Explanation) -> Explanation:
         """The best set with one member exchanged for another, where that is better still; else itself."""
-        fewer = [self.without(best, member) for member in sorted(best.names)]
+        fewer = self.each_without(best, sorted(best.names))
         tasks: dict[Names, Task] = {}
         is_small, is_large = len(best.names) <= SMALL, len(best.names) > LARGEST_SET
         for smaller in fewer:

@@ -11,7 +11,8 @@ SHORTEST_DIVIDED = 48.0  # s; a shorter recording judges as a whole or not at al
 SHORTEST_SPAN = 8.0  # s; a free run over less says little
 JUDGING_SHARE = 0.1  # of a recording, in each of two spans
 LONGEST_RUN = 600.0  # s; a teaching run starts anew after so long, or the smallest drift would rule it
-LONG, EXCERPT = 15000, 4000  # rows of all teaching runs: from how many on a search looks at so many first
+LONG = 15000  # rows of all teaching runs, beyond which a search begins with an excerpt
+EXCERPT = 4000  # rows
 LEAST_MEASURED = 20  # values of each channel, for a span to be of use
 
 

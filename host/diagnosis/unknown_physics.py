@@ -61,7 +61,7 @@ def _grown(search: Search, best: Explanation) -> list[Explanation]:
     """
     parents = [best]
     if not _is_large(best):
-        parents += [search.without(best, name) for name in sorted(best.names)]
+        parents += search.each_without(best, sorted(best.names))
     found = search.workers.results([("form_gains", (parent,)) for parent in parents])
     chosen = {}
     for parent, gains in zip(parents, found, strict=True):
