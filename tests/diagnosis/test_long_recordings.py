@@ -1,0 +1,45 @@
+"""A long recording is searched in an excerpt, then judged as a whole."""
+
+import numpy as np
+import pytest
+from hidden_dive import hidden_dive
+
+from host.diagnosis import spans
+from host.diagnosis.diagnose import diagnose
+from host.recording import Array
+
+
+def _coupled(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+    # A coupling throughout, and 1 cm/s^2 of weight taken on late: most of an excerpt does not see it.
+    return 0.8 * x[1] + 0.01 * (time > 170.0), 0.0, 0.0
+
+
+def test_what_is_short_is_its_own_excerpt() -> None:
+    teaching = spans.divide([hidden_dive()]).teaching
+    assert spans.excerpt(teaching) is teaching
+
+
+def test_an_excerpt_has_a_piece_of_each_run_where_the_plane_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spans, "LONG", 1500)
+    monkeypatch.setattr(spans, "EXCERPT", 600)
+    first, second = hidden_dive(duration=90.0), hidden_dive(duration=90.0, seed=1)
+    first.rudder[:550] = 0.0
+    pieces = spans.excerpt([first, second])
+    assert [piece.time.size for piece in pieces] == [300, 300]
+    assert pieces[0].time[0] == pytest.approx(60.0, abs=0.2)  # the time is still that of the recording
+    at = np.searchsorted(first.time, pieces[0].time)
+    np.testing.assert_array_equal(pieces[0].depth, first.depth[at])
+
+
+def test_a_long_recording_is_diagnosed_from_its_excerpt(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spans, "LONG", 1500)
+    monkeypatch.setattr(spans, "EXCERPT", 800)
+    said: list[str] = []
+    found = diagnose([hidden_dive(_coupled, duration=240.0)], said.append)
+    assert said.index("an excerpt") < said.index("the whole")
+    assert found.verdict == "explained"
+    effects = {effect.name: effect.coefficients for effect in found.effects}
+    assert effects.keys() == {"heave_pitch_rate_coupling", "ballast_change"}
+    value, std, _ = effects["heave_pitch_rate_coupling"]["c_wq"]
+    assert abs(value - 0.8) < 4.0 * std
+    assert found.ranking[0][1] > 0.0
