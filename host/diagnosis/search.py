@@ -8,7 +8,7 @@ Where few effects leave much, what every vehicle has is fitted together and prun
 each may look idle or be mistaken until the others are there.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from itertools import combinations
 from math import inf, log
@@ -56,7 +56,8 @@ class Search:
     part: "Search | None" = None
     tried: dict[Names, Explanation] = field(default_factory=dict)
     _rivals: set[Names] = field(default_factory=set)  # those fitted in the place of another
-    _shrunk: set[Names] = field(default_factory=set)  # those fitted to the end from a larger set
+    _shrunk: set[Names] = field(default_factory=set)  # those fitted from a larger set
+    _polished: set[Names] = field(default_factory=set)  # those of them fitted to the end
 
     def run(self, also: list[Explanation] | None = None) -> Explanation:
         """The best explanation all of whose members pay for themselves; `also` are sets worth a look."""
@@ -67,7 +68,7 @@ class Search:
             settled = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
             return self._settled(min(settled, key=lambda e: e.bic))
         for size in range(1, LARGEST_SET + 1):
-            if size == SMALL and self._ordinary_suffices(beam[0]):
+            if size > SMALL and self._ordinary_suffices(beam[0]):
                 break
             grown = self._grown(beam, size)
             best_before = min(e.bic for e in beam)
@@ -107,11 +108,10 @@ class Search:
 
     def each_without(self, best: Explanation, members: list[str]) -> list[Explanation]:
         """The set less each of these members."""
-        missing = [name for name in members if best.names - {name} not in self.tried]
-        rough = self.workers.results([("shrunk", (best, name)) for name in missing])
-        for explanation in self.workers.results([("polished", (e,)) for e in rough]):
-            self.remember(explanation)
-        return [self.tried[best.names - {name}] for name in members]
+        sets = [best.names - {name} for name in members]
+        self._shrink(best, [names for names in sets if names not in self.tried])
+        self._polish([names for names in sets if names in self._shrunk])
+        return [self.tried[names] for names in sets]
 
     def gain_alone(self, name: str) -> float:
         """What the effect alone takes off the BIC: of the root, of the base if an offset; -inf if untried."""
@@ -143,30 +143,38 @@ class Search:
 
     def pruned(self, explanation: Explanation) -> Explanation:
         """The set less the members that do not pay for themselves."""
-        doubtful = set(explanation.names)
+        given, doubtful = explanation, set(explanation.names)
         while doubtful:
             smaller = {explanation.names - {member}: member for member in sorted(doubtful)}
-            tasks: list[Task] = [
-                ("shrunk", (explanation, member))
-                for names, member in smaller.items()
-                if names not in self._shrunk
-            ]
-            found = self.workers.results(tasks)
-            # What a rough fit loses by far is needed; what it hardly loses must be known well.
-            close = [e for e in found if e.bic < explanation.bic + self.margin(explanation) + ROUGH]
-            found += self.workers.results([("polished", (e,)) for e in close])
-            for one in found:
-                self.remember(one)
-                self._shrunk.add(one.names)
+            limit = explanation.bic + self.margin(explanation)
+            self._shrink(explanation, smaller)
+            if all(self.tried[names].bic > limit for names in smaller):
+                self._polish([names for names in smaller if self.tried[names].bic < limit + ROUGH])
             leanest = min((self.tried[names] for names in smaller), key=lambda e: e.bic)
-            if leanest.bic > explanation.bic + self.margin(explanation):
+            if leanest.bic > limit:
                 break
             # What is clearly needed beside others is needed without them.
-            limit = explanation.bic + self.margin(explanation) + ROUGH
-            doubtful = {smaller[names] for names in smaller if self.tried[names].bic < limit}
+            doubtful = {smaller[names] for names in smaller if self.tried[names].bic < limit + ROUGH}
             doubtful &= leanest.names
             explanation = leanest
-        return explanation
+        if explanation is not given:
+            self._polish([explanation.names])
+        return self.tried.get(explanation.names, explanation)
+
+    def _shrink(self, explanation: Explanation, smaller: Iterable[Names]) -> None:
+        """Fits sets of one member less roughly, once."""
+        new = [names for names in smaller if names not in self._shrunk]
+        members = [next(iter(explanation.names - names)) for names in new]
+        for found in self.workers.results([("shrunk", (explanation, member)) for member in members]):
+            self.remember(found)
+        self._shrunk.update(new)
+
+    def _polish(self, sets: Iterable[Names]) -> None:
+        """Fits sets to the end, once."""
+        new = [names for names in sets if names not in self._polished]
+        for found in self.workers.results([("polished", (self.tried[names],)) for names in new]):
+            self.remember(found)
+        self._polished.update(new)
 
     def remember(self, explanation: Explanation) -> Explanation:
         """Keeps the better of two fits of one set."""
@@ -190,8 +198,10 @@ class Search:
         for name in ORDINARY:
             if name not in joint.names:
                 joint = self.fitter.grown(joint, name, self._values(name))
-        joint = self.pruned(self.remember(self.fitter.polished(joint)))
-        return joint.bic < leading.bic and self.fitter.excess(joint.fit) < NEAR
+        joint = self.remember(self.fitter.polished(joint))
+        if joint.bic > leading.bic:
+            return False
+        return self.fitter.excess(self.pruned(joint).fit) < NEAR
 
     def _parents(self, grown: list[Explanation]) -> list[Explanation]:
         """The best sets, as far as they explain a fair part of what the very best does."""
