@@ -21,6 +21,9 @@ def test_a_small_trial_runs_and_is_taken_up_again(tmp_path: Path, capsys: pytest
     assert said.index("answers sealed") < said.index("answers opened")
     assert main(words) in (0, 1)
     assert json.loads((tmp_path / "trial.json").read_text()) == first
+    words[4] = "1"
+    assert main(words) in (0, 1)
+    assert json.loads((tmp_path / "trial.json").read_text())["recordings"] == 1
 
 
 def test_nonsense_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,7 +12,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, default=Path("trial"), metavar="DIR", help="where everything goes"
     )
-    parser.add_argument("--count", type=int, default=300, metavar="N", help="recordings (default 300)")
+    parser.add_argument(
+        "--count",
+        type=int,
+        default=300,
+        metavar="N",
+        help="recordings (default 300); of a trial with more, the first N",
+    )
     parser.add_argument("--seed", type=int, help="repeats a trial; without it nobody knows the answers")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes at once (default 2)")
     parser.add_argument("--quiet", action="store_true", help="no progress")
@@ -43,11 +49,12 @@ def run(args: argparse.Namespace) -> int:
             with stage("drawing vehicles", args.count) as step:
                 digest = write_trial(folder, seed, args.count, args.jobs, step)
         print(f"answers sealed: SHA-256 {digest}  {folder / SEALED}", flush=True)
-        paths = recordings(folder)
+        paths = recordings(folder)[: args.count]
         with stage("diagnosing", len(paths)) as step:
             runs = diagnose_all(folder, paths, args.jobs, step)
     try:
         seed, answers = open_answers(folder, digest)
+        answers = answers[: args.count]
     except BrokenSeal as error:
         print(f"mils: {error}", file=sys.stderr)
         return 2
