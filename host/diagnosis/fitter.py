@@ -26,7 +26,6 @@ RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exac
 FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
 # Enough to rank sets; those that count are polished.
 FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 12, 0.2
-LINES_TRIED = 3
 
 
 class Fitter:

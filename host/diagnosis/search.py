@@ -65,6 +65,7 @@ class Search:
             self.remember(explanation)
         beam = [self.remember(self.root)]
         if self.part is not None:
+            self.on_progress("settling")
             settled = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
             return self._settled(min(settled, key=lambda e: e.bic))
         for size in range(1, LARGEST_SET + 1):
