@@ -8,7 +8,7 @@ import pytest
 from tools.sitl.plant import stream
 from tools.sitl.recording import COLUMNS, measure, record, sail, write_csv, write_truth
 from tools.sitl.scenario import Scenario, load
-from tools.sitl.sensors import Channel, Instrument, Sensors
+from tools.sitl.sensors import Channel, Instrument, Lag, Sensors
 
 COUNT = 40_000
 
@@ -99,6 +99,15 @@ def test_measured_plane_differs_from_the_command_by_the_lag():
     scenario = replace(load("fin_damage"), duration_s=30.0)
     measured = replace(scenario, sensors=replace(scenario.sensors, rudder_is_measured=True))
     assert np.max(np.abs(record(measured, 1)["rudder_rad"] - record(scenario, 1)["rudder_rad"])) > 0.05
+
+
+@pytest.mark.parametrize("time_s", [0.03, 0.5])
+def test_lag_shows_a_ramp_late_by_its_time_whatever_the_step(time_s: float):
+    for step_s in (0.005, 0.02):
+        lag = Lag(time_s, step_s)
+        shown = [lag.follow(3.0 * step_s * k) for k in range(round(4.0 / step_s))]
+        assert shown[-1] == pytest.approx(3.0 * (step_s * (len(shown) - 1) - time_s), abs=2e-3)
+    assert [Lag(0.0, 0.01).follow(value) for value in (1.0, 2.0)] == [1.0, 2.0]
 
 
 def test_record_is_determined_by_the_seed():

@@ -107,22 +107,34 @@ class Instrument:
         return not self.arrives(np.array([t_s]))[0]
 
 
+class Lag:
+    """A first-order lag, exact for a value that changes linearly within a step; 0 s is none."""
+
+    def __init__(self, time_s: float, step_s: float) -> None:
+        self.keeps = exp(-step_s / time_s) if time_s > 0.0 else 0.0
+        self.behind = (1.0 - self.keeps) * time_s / step_s  # of one step's change
+        self.felt = self.shown = nan
+
+    def follow(self, felt: float) -> float:
+        """What is shown one step later; the first call starts settled."""
+        if self.shown != self.shown:
+            self.felt = self.shown = felt
+        change = felt - self.felt
+        self.shown = felt - self.behind * change + self.keeps * (self.shown - self.felt)
+        self.felt = felt
+        return self.shown
+
+
 class DepthAndPitchSensing:
     """The physical side of the instruments: where they sit and how slowly they answer."""
 
     def __init__(self, effects: Effects, step_s: float) -> None:
         self.lever_arm = effects.depth_sensor_lever_arm
         self.bias = effects.pitch_bias
-        self.depth_keeps = exp(-step_s / effects.depth_sensor_lag) if effects.depth_sensor_lag > 0.0 else 0.0
-        self.pitch_keeps = exp(-step_s / effects.pitch_sensor_lag) if effects.pitch_sensor_lag > 0.0 else 0.0
-        self.depth = nan
-        self.pitch = nan
+        self.depth = Lag(effects.depth_sensor_lag, step_s)
+        self.pitch = Lag(effects.pitch_sensor_lag, step_s)
 
     def follow(self, depth: float, sine_of_pitch: float, pitch: float, head: float) -> tuple[float, float]:
         """Sensed depth and pitch one step later; `head` is the pressure head of the waves, m."""
         felt_depth = depth - self.lever_arm * sine_of_pitch + head
-        if self.depth != self.depth:  # the first call: the filters start settled
-            self.depth, self.pitch = felt_depth, pitch
-        self.depth = felt_depth + self.depth_keeps * (self.depth - felt_depth)
-        self.pitch = pitch + self.pitch_keeps * (self.pitch - pitch)
-        return self.depth, self.pitch + self.bias
+        return self.depth.follow(felt_depth), self.pitch.follow(pitch) + self.bias
