@@ -52,7 +52,9 @@ class Chain:
     extra        states of effects by name
     speed        u, m/s, measured where `is_speed_known` is 1; `speed_ratio` u / u0, on which forces depend;
     surge        u', m/s^2, of the measured speed
-    command      rad, the plane as commanded; `earlier` the commands of the rows before, newest first
+    command      rad, the plane as commanded, its mean over the sub-step; `earlier` the commands of the rows
+                 before, newest first; `change` rad, by which the command grows over the sub-step
+    elapsed      s from the row to the sub-step, `substep` its length
     plane        rad, the angle at which the plane acts
     heave, pitch, climb   terms added to w' (m/s^2), q' (rad/s^2), zeta' (m/s)
     sensed_pitch, sensed_depth   what the sensors give
@@ -72,7 +74,10 @@ class Chain:
     surge: ca.SX
     command: ca.SX
     earlier: list[ca.SX]
+    elapsed: ca.SX
     plane: ca.SX
+    substep: ca.SX = field(default_factory=lambda: ca.SX(0))
+    change: ca.SX = field(default_factory=lambda: ca.SX(0))
     heave: ca.SX = field(default_factory=lambda: ca.SX(0))
     pitch: ca.SX = field(default_factory=lambda: ca.SX(0))
     climb: ca.SX = field(default_factory=lambda: ca.SX(0))
@@ -150,7 +155,7 @@ class Structure:
         """The symbols at one instant; `drive` as in host.propagate.Inputs."""
         p = dict(zip(self.names, ca.vertsplit(parameters), strict=True))
         w, q, theta, zeta, *extra = ca.vertsplit(x)
-        rudder, measured, is_known, interval, _, surge, *earlier = ca.vertsplit(drive)
+        rudder, measured, is_known, interval, row_time, surge, *earlier = ca.vertsplit(drive)
         speed = p["u0"] * (1 - is_known) + measured * is_known
         return Chain(
             p=p,
@@ -167,6 +172,7 @@ class Structure:
             surge=surge,
             command=rudder,
             earlier=earlier,
+            elapsed=time - row_time,
             plane=rudder,
             sensed_pitch=theta,
             sensed_depth=zeta,
@@ -195,6 +201,7 @@ class Structure:
     def actuate(self, chain: Chain, substep: ca.SX) -> dict[str, ca.SX]:
         """Sets the chain's plane angle for one sub-step; gives the next states of the actuators."""
         moved = {}
+        chain.substep = substep
         for effect in self.effects:
             if effect.command is not None:
                 effect.command(chain)
@@ -202,6 +209,7 @@ class Structure:
         for effect in self.effects:
             if effect.actuator is not None and effect.state is not None:
                 chain.plane, moved[effect.state] = effect.actuator(chain, chain.extra[effect.state], substep)
+                chain.change = ca.SX(0)  # smoothed away
         for effect in self.effects:
             if effect.plane is not None:
                 effect.plane(chain)

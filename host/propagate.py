@@ -106,11 +106,11 @@ class Form:
             time = drive[4] + k * h
             at_start = self.structure.chain(x, p, drive, time)
             moved = self.structure.actuate(at_start, h)
-            held = (at_start.plane, p, drive)
-            k1 = slope(x, time, *held)
-            k2 = slope(x + h / 2 * k1, time + h / 2, *held)
-            k3 = slope(x + h / 2 * k2, time + h / 2, *held)
-            k4 = slope(x + h * k3, time + h, *held)
+            plane, half = at_start.plane, at_start.change / 2
+            k1 = slope(x, time, plane - half, p, drive)
+            k2 = slope(x + h / 2 * k1, time + h / 2, plane, p, drive)
+            k3 = slope(x + h / 2 * k2, time + h / 2, plane, p, drive)
+            k4 = slope(x + h * k3, time + h, plane + half, p, drive)
             x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
             for name, value in moved.items():
                 x[states.index(name)] = value

@@ -11,12 +11,18 @@ def _offset(c: Chain) -> None:
 
 
 def _delay(c: Chain) -> None:
-    rows = c.p["delay"] / c.interval
-    weights = [ca.fmax(0, 1 - ca.fabs(rows - lag)) for lag in range(len(c.earlier) + 1)]
-    c.command = ca.dot(ca.vertcat(*weights), ca.vertcat(c.command, *c.earlier))
+    """Within the sub-step a late command may give way to the next: its mean and first moment are kept."""
+    mean, change, ends = ca.SX(0), ca.SX(0), ca.SX(1)
+    for lag, command in enumerate((c.command, *c.earlier)):
+        begins = ca.fmax(0, ca.fmin(1, (c.p["delay"] - lag * c.interval - c.elapsed) / c.substep))
+        mean += command * (ends - begins)
+        change += command * 6 * (ends * (ends - 1) - begins * (begins - 1))
+        ends = begins
+    c.command, c.change = mean, change
 
 
 def _saturation(c: Chain) -> None:
+    c.change = ca.if_else(ca.fabs(c.command) < c.p["plane_limit"], c.change, 0)
     c.command = limited(c.command, c.p["plane_limit"])
 
 

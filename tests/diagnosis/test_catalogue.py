@@ -51,6 +51,23 @@ def test_effect_acts_and_its_sensitivities_are_exact(name: str) -> None:
         assert np.allclose(sensitivity[:, index], slope, atol=2e-4 * max(np.abs(slope).max(), 1e-6))
 
 
+@pytest.mark.parametrize("delay", [0.04, 0.13, 0.25])
+def test_a_delay_is_that_of_the_command_however_coarse_the_rows(delay: float) -> None:
+    rows = hidden_dive(duration=30.0)
+    values = np.array([*BASE.values(), 0.0, 0.0])
+    run = free_run(np.append(values, delay), START, inputs_of(rows, structure_of(("actuator_delay",))))
+    each = 10  # finer rows, on which the commands are moved by the delay
+    late = np.concatenate([np.full(round(delay * 100.0), rows.rudder[0]), np.repeat(rows.rudder, each)])
+    count = rows.time.size * each
+    blank = np.full(count, np.nan)
+    fine = replace(
+        rows, step=0.01, time=0.01 * np.arange(count), rudder=late[:count], depth=blank, pitch=blank,
+        speed=blank, pitch_rate=blank,
+    )  # fmt: skip
+    true = free_run(values, START, inputs_of(fine)).outputs[:, ::each]
+    assert np.abs(run.outputs - true).max() < 1e-3 * np.ptp(true, axis=1).min()
+
+
 def test_a_low_centre_of_gravity_feels_a_change_of_speed() -> None:
     # With the planes level and no heave only the surge acceleration turns the vehicle: theta = -u'/g.
     still = hidden_dive(duration=30.0)
