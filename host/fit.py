@@ -1,6 +1,7 @@
 """The maximum of the likelihood over recordings, and what it says of its own accuracy."""
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,6 +9,13 @@ from host.equations import Structure
 from host.gauss_newton import GaussNewton, Mask, Point
 from host.propagate import NX0, Inputs
 from host.recording import Array
+
+
+class Rival(NamedTuple):
+    """Another maximum: its parameters, and the logarithm of its odds against the best, at most 0."""
+
+    parameters: Array
+    log_odds: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +30,7 @@ class Fit:
     wander       variance and correlation time s of the part of each sensor's error, pitch and depth, that
                  wanders (2, 2); zero where all of it is white
     waves        frequency rad/s and damping ratio of the random forces, (2,); zero where they are white
-    rivals       parameters of other maxima that are almost as likely
+    rivals       other maxima that are almost as likely
     whitened     innovations over their deviation, (2, N) each, NaN where nothing was measured
     scores       whitened sensitivities of the free parameters, (2, free, N) each, what the initial states
                  could explain taken out
@@ -41,7 +49,7 @@ class Fit:
     converged: bool
     wander: Array = field(default_factory=lambda: np.zeros((2, 2)))
     waves: Array = field(default_factory=lambda: np.zeros(2))
-    rivals: tuple[Array, ...] = ()
+    rivals: tuple[Rival, ...] = ()
 
     @property
     def has_process_noise(self) -> bool:

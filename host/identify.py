@@ -16,7 +16,7 @@ from host.model import VehicleModel, model_of
 from host.outliers import without_outliers
 from host.predict import Prediction, predict
 from host.recording import Array, Recording
-from host.uncertainty import covariance
+from host.uncertainty import covariance, covariance_within
 from host.vehicle import Vehicle
 from host.whiteness import is_white
 
@@ -170,9 +170,10 @@ def _notes(fit: Fit | None, method: Method) -> list[str]:
     if fit.has_coloured_noise:
         notes.append(f"The sensors' errors wander{_wandering(fit)}; the deviations include it.")
     notes += [
-        combination.sentence for combination in open_combinations(fit.parameters, covariance(fit), fit.free)
+        combination.sentence
+        for combination in open_combinations(fit.parameters, covariance_within(fit), fit.free)
     ]
-    notes += [ambiguity(fit.parameters, rival) for rival in fit.rivals]
+    notes += [ambiguity(fit.parameters, rival.parameters) for rival in fit.rivals]
     at_bound = [
         parameter.name
         for parameter, value, is_free in zip(fit.structure.parameters, fit.parameters, fit.free, strict=True)

@@ -10,7 +10,21 @@ LONGEST_CORRELATION = 0.1  # of a recording's rows: beyond it autocovariances ar
 
 
 def covariance(fit: Fit) -> Array:
-    """Covariance (8, 8) of the parameters; zero for held ones.
+    """Mean square error (n, n) of the parameters as far as the recording tells; zero for held ones.
+
+    The covariance about the maximum, and where others are almost as likely, p_i d_i d_i^T for the distance
+    d_i of each and its probability p_i.
+    """
+    odds = [np.exp(rival.log_odds) for rival in fit.rivals]
+    total = covariance_within(fit)
+    for rival, chance in zip(fit.rivals, odds, strict=True):
+        away = rival.parameters - fit.parameters
+        total = total + chance / (1.0 + sum(odds)) * np.outer(away, away)
+    return total
+
+
+def covariance_within(fit: Fit) -> Array:
+    """Covariance (n, n) of the parameters about this maximum; zero for held ones.
 
     White innovations: the inverse Fisher information M^-1. Coloured ones: M^-1 B M^-1 with
     B = sum_k sum_l s_k R(k - l) s_l^T from the innovations' own auto- and crosscovariances R (Grauer and

@@ -46,7 +46,7 @@ def heldout_errors(path: Path, names: tuple[str, ...], start: dict[str, float]) 
     from host.diagnosis.scoring import misfit
     from host.diagnosis.spans import divide
     from host.gauss_newton import Point
-    from host.maximum_likelihood import output_error
+    from host.output_error import output_error
 
     spans = divide(recordings)
     fitter = Fitter(spans.teaching)

@@ -184,7 +184,7 @@ def _with_coefficients(effect: NamedEffect, values: dict[str, float], std: dict[
 def _refitted(explanation: Explanation, recordings: list[Recording]) -> Explanation:
     """The set fitted to all stretches, teaching and judging, for the model that is handed back."""
     fitter = Fitter(recordings, known=explanation)
-    again = fitter.refitted(explanation)
+    again = fitter.across(fitter.refitted(explanation))
     return fitter.with_sea(again) if explanation.fit.has_process_noise else again
 
 

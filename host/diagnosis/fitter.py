@@ -15,10 +15,12 @@ from host.equations import NAMES, Effect
 from host.filter_error import filter_error, filter_error_from
 from host.fit import Fit
 from host.gauss_newton import Mask, Point
-from host.maximum_likelihood import annealed, fit_maximum_likelihood, output_error
+from host.maximum_likelihood import fit_maximum_likelihood
+from host.output_error import annealed, output_error
 from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
 from host.recording import Array, Recording
 from host.rounding import thinned
+from host.valleys import other_valleys, plausibility, with_rivals
 from host.wave_forces import wave_forces, wave_forces_from
 
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
@@ -177,6 +179,17 @@ class Fitter:
         start = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
         return self._explained(explanation.names, self._carried_on(start))
 
+    def across(self, explanation: Explanation) -> Explanation:
+        """The same set in the likeliest valley of all, with the others that this recording cannot rule out.
+
+        With random forces it stays where it is: the valleys of a free run are not those of a filter.
+        """
+        fit = explanation.fit
+        if fit.has_process_noise:
+            return explanation
+        ends = other_valleys(fit, self.inputs(explanation.names))
+        return self._explained(explanation.names, with_rivals(fit, ends))
+
     def refitted(self, explanation: Explanation) -> Explanation:
         """A set fitted to other stretches, fitted to these."""
         structure, values = structure_of(explanation.names), explanation.fit.parameters.copy()
@@ -201,9 +214,10 @@ class Fitter:
         return int(self.free(names).sum() - self.free(frozenset()).sum())
 
     def bic(self, fit: Fit, names: Names) -> float:
-        """Bayesian information criterion of a fit; lower is better."""
+        """Bayesian information criterion of a fit, with the prior of the speed; lower is better."""
         rare = sum(not named(name).is_common for name in names)
-        return fit.bic + self.free_parameters(names) * log(fit.samples) + RARITY * rare
+        doubt = 2.0 * (fit.log_likelihood - plausibility(fit))
+        return fit.bic + doubt + self.free_parameters(names) * log(fit.samples) + RARITY * rare
 
     def inputs(self, names: Names) -> list[Inputs]:
         """What drives the set's equations over each recording."""

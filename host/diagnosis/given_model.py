@@ -16,8 +16,8 @@ from host.diagnosis.spans import divide
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.equations import NAMES, Slot
 from host.gauss_newton import Point
-from host.maximum_likelihood import output_error
 from host.model import VehicleModel
+from host.output_error import output_error
 from host.propagate import inputs_of
 from host.recording import Array, Recording
 

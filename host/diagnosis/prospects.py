@@ -12,7 +12,7 @@ from host.equations import Effect
 from host.filter_error import whitened_innovations
 from host.fit import Fit
 from host.gauss_newton import GaussNewton, Point
-from host.maximum_likelihood import RUNAWAY, residuals_at
+from host.output_error import RUNAWAY, residuals_at
 from host.propagate import Inputs
 from host.recording import Array
 from host.wave_forces import whitened_among_waves

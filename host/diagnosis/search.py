@@ -250,7 +250,8 @@ class Search:
         return [fit.parameters[own]]
 
     def _settled(self, best: Explanation) -> Explanation:
-        """Prunes and exchanges members of the set until neither helps."""
+        """Prunes and exchanges members of the set until neither helps, in the likeliest valley."""
+        best = self.remember(self.fitter.across(best))
         for _ in range(MOST_ROUNDS):
             best = self.pruned(best)
             rival = self.exchanged(best)

@@ -20,7 +20,7 @@ from host.diagnosis.search import TWIN_MARGIN, Progress
 from host.equations import NAMES, Effect, Slot
 from host.filter_error import whitened_innovations
 from host.gauss_newton import GaussNewton, Point
-from host.maximum_likelihood import residuals_at
+from host.output_error import residuals_at
 from host.propagate import LONGEST_SUBSTEP, Inputs, free_run, inputs_of
 from host.recording import Array, Recording
 

@@ -6,12 +6,15 @@ from dataclasses import replace
 import numpy as np
 from exact_dive import TABLE_1, Dive, fly
 
-from host.equations import NAMES
+from host.equations import BASE, NAMES
+from host.gauss_newton import Point
 from host.identifiability import open_combinations, undetermined
 from host.identify import identify
 from host.maximum_likelihood import fit_maximum_likelihood
+from host.output_error import output_error
+from host.propagate import inputs_of
 from host.recording import Array, Recording
-from host.uncertainty import covariance
+from host.uncertainty import covariance, covariance_within
 from host.vehicle import default_vehicle
 
 
@@ -73,9 +76,13 @@ def test_two_valleys_are_told() -> None:
     (note,) = [note for note in result.notes if note.startswith("Two answers")]
     assert "u0" in note
     # The other answer is a maximum as well: begun there, the search stays and ends almost as likely.
-    again = fit_maximum_likelihood([fly(dive)[0]], starts=[(rival, result.fit.initial)])
-    assert np.allclose(again.parameters[:6], rival[:6], rtol=0.1)
+    start = Point(BASE, rival.parameters, result.fit.initial, result.fit.noise)
+    again = output_error(start, [inputs_of(result.recordings[0])], result.fit.free)
+    assert np.allclose(again.parameters[:6], rival.parameters[:6], rtol=0.1)
     assert abs(again.log_likelihood - result.fit.log_likelihood) < 3.0
+    # Who reads a value and its deviation alone is warned as well.
+    local, whole = covariance_within(result.fit), covariance(result.fit)
+    assert whole[5, 5] > local[5, 5] + 0.04 * (rival.parameters[5] - result.fit.parameters[5]) ** 2
     more = fit_maximum_likelihood([fly(replace(dive, amplitude=0.25, duration=120.0))[0]])
     assert more.rivals == ()
     assert abs(more.parameters[5] / TABLE_1["u0"] - 1.0) < 0.3

@@ -1,0 +1,69 @@
+"""Where heave damping and speed trade places, the other valley is found from either."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from exact_dive import Dive, fly
+
+from host.equations import BASE, NAMES
+from host.fit import Fit
+from host.gauss_newton import Point
+from host.maximum_likelihood import fit_maximum_likelihood
+from host.output_error import output_error
+from host.propagate import Inputs, inputs_of
+from host.uncertainty import covariance
+from host.valleys import USUAL_SPEED, other_valleys, plausibility, with_rivals
+
+U0 = NAMES.index("u0")
+
+
+@pytest.fixture(scope="module")
+def two_ends() -> tuple[Fit, Fit, list[Inputs]]:
+    """The ends of searches from both valleys of a dive with little motion under much noise."""
+    dive = Dive(seed=7, duration=40.0, amplitude=0.1, pitch_noise=0.01, depth_noise=0.05)
+    inputs = [inputs_of(fly(dive)[0])]
+    best = fit_maximum_likelihood([fly(dive)[0]], noise_model="output_error")
+    (rival,) = best.rivals
+    start = Point(BASE, rival.parameters, best.initial, best.noise)
+    return best, output_error(start, inputs, best.free), inputs
+
+
+def test_each_valley_leads_to_the_other(two_ends: tuple[Fit, Fit, list[Inputs]]) -> None:
+    best, other, inputs = two_ends
+    for here, there in ((best, other), (other, best)):
+        found = other_valleys(here, inputs)
+        assert any(np.allclose(end.parameters[:6], there.parameters[:6], rtol=0.05) for end in found)
+        again = with_rivals(here, found)
+        assert np.allclose(again.parameters[:6], best.parameters[:6], rtol=0.05)
+        assert len(again.rivals) == 1
+
+
+def test_a_measured_or_held_speed_leaves_one_valley(two_ends: tuple[Fit, Fit, list[Inputs]]) -> None:
+    best, _, inputs = two_ends
+    held = best.free & (np.arange(best.free.size) != U0)
+    assert other_valleys(replace(best, free=held), inputs) == []
+    assert plausibility(replace(best, free=held)) == best.log_likelihood
+
+
+def test_a_vehicle_that_hardly_moves_forward_must_earn_it(two_ends: tuple[Fit, Fit, list[Inputs]]) -> None:
+    best, _, _ = two_ends
+
+    def at(speed: float) -> float:
+        return plausibility(replace(best, parameters=np.where(np.arange(8) == U0, speed, best.parameters)))
+
+    assert at(USUAL_SPEED) == best.log_likelihood
+    assert best.log_likelihood - 1.5 < at(0.3) < best.log_likelihood
+    assert at(0.0) < best.log_likelihood - 15.0
+
+
+def test_rivals_widen_the_deviations_by_their_chance(two_ends: tuple[Fit, Fit, list[Inputs]]) -> None:
+    best, other, _ = two_ends
+    alone = replace(best, rivals=())
+    (rival,) = with_rivals(alone, [other]).rivals
+    chance = np.exp(rival.log_odds) / (1.0 + np.exp(rival.log_odds))
+    away = (other.parameters - best.parameters)[U0]
+    widened = covariance(with_rivals(alone, [other]))[U0, U0] - covariance(alone)[U0, U0]
+    assert widened == pytest.approx(chance * away**2)
+    hopeless = replace(other, log_likelihood=other.log_likelihood - 50.0)
+    assert with_rivals(alone, [hopeless]).rivals == ()
