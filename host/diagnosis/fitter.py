@@ -4,7 +4,7 @@ from math import log
 
 import numpy as np
 
-from host.catalogue import named, structure_of
+from host.catalogue import OFFSETS, named, structure_of
 from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import SPANS
 from host.diagnosis.explanation import Explanation, Names
@@ -25,6 +25,7 @@ from host.wave_forces import wave_forces, wave_forces_from
 
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
 RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exact twins
+COMPRESSED = "depth_dependent_buoyancy"
 FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
 # Enough to rank sets; those that count are polished.
 FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 12, 0.2
@@ -83,22 +84,17 @@ class Fitter:
         return self._explained(names, best)
 
     def retrimmed(self, explanation: Explanation, offsets: Names) -> Explanation:
-        """The same set with some of the catalogue's offsets in place of the free trim."""
-        names = (explanation.names - {FREE_TRIM.name}) | offsets
+        """The same set with some of the catalogue's offsets in place of those it has, or of the free trim."""
+        names = (explanation.names - {FREE_TRIM.name, *OFFSETS}) | offsets
         fit = explanation.fit
         known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
-        a1, a3, u0, b1, b2 = (known[name] for name in ("a1", "a3", "u0", "b1", "b2"))
-        shift = np.array([known["trim_heave"], known["trim_pitch"]])
-        # What one unit of each offset is in constant force and moment; a climb is held by force / -a1.
-        columns = {
-            "net_buoyancy": (1.0, 0.0),
-            "trim_moment": (0.0, 1.0),
-            "rudder_offset": (b1, b2),
-            "pitch_bias": (-a1 * u0, -a3),
-            "vertical_current": (-a1, 0.0),
-        }
+        shift = np.zeros(2)
+        for name in explanation.names & {FREE_TRIM.name, *OFFSETS}:
+            shift += _as_trim(known, name) @ [known[p.name] for p in named(name).parameters]
         chosen = sorted(offsets)
-        table = np.array([columns[name] for name in chosen]).reshape(-1, 2).T
+        if not chosen and COMPRESSED in names:  # its neutral depth takes over
+            known["neutral_depth"] -= shift[0] / (known["c_wz"] or np.inf)
+        table = np.hstack([np.zeros((2, 0)), *(_as_trim(known, name) for name in chosen)])
         values = np.linalg.lstsq(table, shift, rcond=1e-8)[0] if chosen else np.zeros(0)
         known |= {named(n).parameters[0].name: float(v) for n, v in zip(chosen, values, strict=True)}
         structure = structure_of(names)
@@ -207,17 +203,33 @@ class Fitter:
 
     def free(self, names: Names) -> Mask:
         """Which parameters of a set are estimated."""
-        return np.array([name not in self.held for name in structure_of(names).names])
+        held = {*self.held}
+        if FREE_TRIM.name in names:
+            held.add("neutral_depth")  # which would do the same
+        return np.array([name not in held for name in structure_of(names).names])
 
     def free_parameters(self, names: Names) -> int:
         """How many coefficients the set adds to the base."""
         return int(self.free(names).sum() - self.free(frozenset()).sum())
 
     def bic(self, fit: Fit, names: Names) -> float:
-        """Bayesian information criterion of a fit, with the prior of the speed; lower is better."""
+        """Bayesian information criterion of a fit; lower is better.
+
+        Charged as well: a speed that is hardly likely, what not every vehicle has, and the choice among all
+        the periods that an oscillation could have had.
+        """
         rare = sum(not named(name).is_common for name in names)
-        doubt = 2.0 * (fit.log_likelihood - plausibility(fit))
-        return fit.bic + doubt + self.free_parameters(names) * log(fit.samples) + RARITY * rare
+        unlikely = 2.0 * (fit.log_likelihood - plausibility(fit))
+        chosen = sum(2.0 * log(self._periods_within(named(name).periods)) for name in names)
+        return fit.bic + self.free_parameters(names) * log(fit.samples) + RARITY * rare + unlikely + chosen
+
+    def _periods_within(self, limits: tuple[float, float] | None) -> float:
+        """How many oscillations within these limits, s, the longest recording tells apart; at least 1."""
+        if limits is None:
+            return 1.0
+        longest = max(self.recordings, key=lambda recording: recording.duration)
+        shortest = max(limits[0], 2.0 * longest.step)
+        return max(1.0, longest.duration * (1.0 / shortest - 1.0 / limits[1]))
 
     def inputs(self, names: Names) -> list[Inputs]:
         """What drives the set's equations over each recording."""
@@ -285,6 +297,23 @@ class Fitter:
         if start.noise[2:].any():
             return filter_error_from(start, inputs, free)
         return output_error(start, inputs, free)
+
+
+def _as_trim(known: dict[str, float], name: str) -> Array:
+    """Constant force and moment that one unit of an offset is: (2, its parameters).
+
+    A climb is held by force / -a1.
+    """
+    a1, a3, u0, b1, b2 = (known[parameter] for parameter in ("a1", "a3", "u0", "b1", "b2"))
+    columns = {
+        FREE_TRIM.name: [[1.0, 0.0], [0.0, 1.0]],
+        "net_buoyancy": [[1.0], [0.0]],
+        "trim_moment": [[0.0], [1.0]],
+        "rudder_offset": [[b1], [b2]],
+        "pitch_bias": [[-a1 * u0], [-a3]],
+        "vertical_current": [[-a1], [0.0]],
+    }
+    return np.array(columns[name])
 
 
 def is_time(effect: Effect) -> bool:

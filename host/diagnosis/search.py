@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from math import inf, log
 
-from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, ORDINARY, named
+from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, ORDINARY, PITCHING_INTO_DEPTH, named
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter, is_time, measure_alike
@@ -29,6 +29,7 @@ FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
 NARROW = 2  # of larger sets, which cost most and of which there are most
 PROMISING, FEW = 6, 3
 RIVALS = 5
+ALIKE = 0.95  # of the largest gain predicted
 POLISHED = 3
 SMALL = 3  # members; the fits of larger sets cost most, and an exchange of one says least
 ROUGH = 60.0  # of BIC, that a fit of the search may gain by polishing
@@ -251,7 +252,7 @@ class Search:
 
     def _settled(self, best: Explanation) -> Explanation:
         """Prunes and exchanges members of the set until neither helps, in the likeliest valley."""
-        best = self.remember(self.fitter.across(best))
+        (best,) = self._across([best])
         for _ in range(MOST_ROUNDS):
             best = self.pruned(best)
             rival = self.exchanged(best)
@@ -298,18 +299,22 @@ class Search:
             (member,) = best.names - smaller.names
             kin = {e.name for e in CATALOGUE if self._is_kin(e.name, member)}
             gains = self.gains(smaller, is_small, kin if is_large else None)
-            worth = smaller.bic - best.bic
-            likely = [name for name in gains if gains[name] > 0.5 * worth]
-            rivals = set(sorted(likely, key=lambda name: -gains[name])[: RIVALS if is_small else FEW])
+            rivals = self._likely(gains, smaller.bic - best.bic, RIVALS if is_small else FEW)
             kin &= gains.keys()
             rivals |= kin if is_small else {name for name in kin if is_time(named(name))}
             for name in sorted(rivals - best.names):
-                if smaller.names | {name} in self._rivals:
-                    continue
-                self._rivals.add(smaller.names | {name})
                 beside = best if name in kin else None
-                tasks[smaller.names | {name}] = ("grown", (smaller, name, self._values(name), beside))
+                fits = ("grown", (smaller, name, self._values(name), beside))
+                tasks.setdefault(smaller.names | {name}, fits)
+            if member in OFFSETS and not is_large:
+                kept = smaller.names & {*OFFSETS}
+                for name in {*OFFSETS} - best.names:
+                    tasks[smaller.names | {name}] = ("retrimmed", (best, kept | {name}))
+        tasks = {names: task for names, task in tasks.items() if names not in self._rivals}
+        self._rivals.update(tasks)
         grown = [self.remember(e) for e in self.workers.results(list(tasks.values()))]
+        if is_small:
+            grown += self._across([e for e in grown if self._moves_depth(e, best)])
         # Twins may lie at the far end of a curved valley, where a short fit does not come.
         first = sorted(grown, key=lambda e: e.bic)
         least = POLISHED if is_small else 1
@@ -321,11 +326,29 @@ class Search:
         rival = min(leaner, key=lambda e: e.bic, default=best)
         return rival if rival.bic < best.bic - 0.01 else best
 
+    def _across(self, explanations: list[Explanation]) -> list[Explanation]:
+        """Each in its likeliest valley."""
+        return [self.remember(e) for e in self.workers.results([("across", (e,)) for e in explanations])]
+
+    def _moves_depth(self, rival: Explanation, best: Explanation) -> bool:
+        """Whether the exchange is one of near twins among which the base bends most."""
+        return (rival.names ^ best.names) <= {*PITCHING_INTO_DEPTH}
+
+    def _likely(self, gains: dict[str, float], worth: float, count: int) -> set[str]:
+        """Those predicted to do most of what a member is worth, and all that promise as much as the best.
+
+        A fit far from the recording promises less than there is, but the same to all that mend it.
+        """
+        most = max(gains.values(), default=0.0)
+        likely = [name for name in gains if gains[name] > 0.5 * min(worth, most)]
+        ordered = sorted(likely, key=lambda name: -gains[name])
+        return {name for k, name in enumerate(ordered) if k < count or gains[name] > ALIKE * most}
+
     def _is_kin(self, name: str, member: str) -> bool:
         """Whether prediction may misjudge its gain: they measure alike, or share an end of it and pay."""
         if name == member:
             return False
-        if measure_alike(named(name), named(member)):
+        if measure_alike(named(name), named(member)) or {name, member} <= {*PITCHING_INTO_DEPTH}:
             return True
         pays = self.gain_alone(name) > NAMING_MARGIN
         slots = {named(name).slot, named(member).slot}
