@@ -102,6 +102,8 @@ class Effect:
     state     name of the state the effect brings with it, and `initial`, its value at the first row
     probes    start values of its parameters to try; `scales` fits them to a recording
     periods   limits, s, of the last parameter where it is a period, to be read off the residuals
+    sizes     names of the parameters that are 0 where the effect is absent, the rest being idle then; by
+              default the first; () where none is
     lags      whether it looks at earlier commands
     is_common whether every vehicle has it: always tried, and preferred where the recording cannot decide
     """
@@ -122,8 +124,14 @@ class Effect:
     sense: Term | None = None
     state: str | None = None
     initial: Callable[[Chain], ca.SX] | None = None
+    sizes: tuple[str, ...] | None = None
     lags: bool = False
     is_common: bool = False
+
+    @property
+    def size_names(self) -> tuple[str, ...]:
+        """`sizes`, or the default."""
+        return (self.parameters[0].name,) if self.sizes is None else self.sizes
 
 
 @dataclass(frozen=True)

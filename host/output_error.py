@@ -70,6 +70,12 @@ def annealed(start: Point, inputs: list[Inputs], free: Mask, accelerations: tupl
     return point.with_noise(start.noise)
 
 
+def free_run_cost(point: Point, inputs: list[Inputs]) -> float:
+    """-log L of the free run at a point, but for a constant; inf where it runs away."""
+    cost = _concentrated_cost(_residual_noise(_free_run_errors(point, inputs), inputs), inputs)
+    return cost if np.isfinite(cost) else np.inf
+
+
 def residuals_at(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:
     """Free-run residuals whitened by the point's sensor noise, and their sensitivities."""
     return _whitened_by(point.noise, _innovations(point, inputs))

@@ -92,6 +92,7 @@ EFFECTS = (
         manoeuvre="plane steps of increasing size up to the largest command",
         probes=((0.92,), (0.7,), (0.45,), (0.27,), (0.14,)),
         scales=("rudder",),
+        sizes=(),
         command=_saturation,
     ),
     Effect(
@@ -105,6 +106,7 @@ EFFECTS = (
         manoeuvre="plane steps of different sizes: the time they take grows with the size",
         probes=((0.3,), (1.0,), (3.0,)),
         scales=("rudder",),
+        sizes=(),
         actuator=_rate_limit,
         state="rate_limited",
         initial=_at_command,
@@ -147,6 +149,7 @@ EFFECTS = (
         manoeuvre="plane steps of increasing size beyond the stall angle",
         probes=((0.2, 1.2), (0.45, 1.3), (0.75, 1.6)),
         scales=("rudder", ""),
+        sizes=("stall_loss",),
         plane=_stall,
     ),
     Effect(

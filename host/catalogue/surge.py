@@ -31,6 +31,7 @@ EFFECTS = (
         "a1, a2 ~ u; b1, b2 ~ u^2",
         manoeuvre="record the speed, or hold large plane angles for ten seconds and return to level",
         probes=((5.0, 0.0, 0.0), (30.0, 0.0, 0.0), (150.0, 0.0, 0.0)),
+        sizes=("c_ud", "c_uq"),
         force=_speed_loss,
         state="speed_loss",
         initial=lambda c: 0 * c.zeta,

@@ -129,6 +129,7 @@ def _wandering(side: Side) -> Effect:
         manoeuvre="a straight level run as long as this one",
         probes=((*((0.0,) * DEGREE), 1.0),),
         scales=(*(("",) * DEGREE), "duration"),
+        sizes=names,
         force=force,
     )
 
@@ -145,6 +146,7 @@ SWINGING_MOMENT = Effect(
     equation="q' = ... + swing_sine sin(2 pi t/T) + swing_cosine cos(2 pi t/T), T = swing_period",
     manoeuvre="a straight level run of several periods with the planes fixed",
     probes=((1e-3, 1e-3, 10.0),),
+    sizes=("swing_sine", "swing_cosine"),
     periods=SWING_PERIODS,
     force=_swinging_moment,
 )

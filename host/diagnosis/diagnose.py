@@ -153,7 +153,8 @@ def _explain(
     may_be_sea = part is None or part.best.fit.has_process_noise
     if may_be_sea and (unknown_in(best) or not left.is_nothing):
         search, best = in_a_sea(search, best)
-        search, best, waves = among_waves(search, best)
+        if part is None or part.waves is not None:
+            search, best, waves = among_waves(search, best)
         left = leftover(fitter, best if waves is None else waves.fitted)
     return Explained(best, search, left, waves)
 

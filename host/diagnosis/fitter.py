@@ -1,5 +1,6 @@
 """Fits of sets of effects, jointly with the base, to the recordings of one vehicle."""
 
+from dataclasses import replace
 from math import log
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from host.catalogue import OFFSETS, named, structure_of
 from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import SPANS
+from host.diagnosis.absence import one_step_without
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations, first_guess
 from host.diagnosis.noise_floor import noise_floor
@@ -16,7 +18,7 @@ from host.filter_error import filter_error, filter_error_from
 from host.fit import Fit
 from host.gauss_newton import Mask, Point
 from host.maximum_likelihood import fit_maximum_likelihood
-from host.output_error import annealed, output_error
+from host.output_error import annealed, free_run_cost, output_error
 from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
 from host.recording import Array, Recording
 from host.rounding import thinned
@@ -29,6 +31,8 @@ COMPRESSED = "depth_dependent_buoyancy"
 FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
 # Enough to rank sets; those that count are polished.
 FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 12, 0.2
+NOT_THERE = 1.2  # times the sensor noise that the set left elsewhere: it has ended in another valley
+ROUGHLY = 1.0  # of a log-likelihood: a set does at least as well as with one member less
 
 
 class Fitter:
@@ -151,7 +155,16 @@ class Fitter:
             starts += [
                 self.point(names, rival, name, probe) for probe in self._same_size(rival, parent, name)
             ]
-        return self._explained(names, self._fit(starts))
+        fit, is_white = self._fit(starts), not parent.fit.has_process_noise
+        if is_white and named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
+            fit = self._fit([self._idle(names, parent, name, likely[0][1])])
+        return self._explained(names, fit)
+
+    def _idle(self, names: Names, parent: Explanation, name: str, probe: Array) -> Point:
+        """A start at which the effect that joins does not act yet, as near as its bounds allow."""
+        point, effect = self.point(names, parent, name, probe), named(name)
+        values = np.where(np.isin(point.structure.names, effect.size_names), 0.0, point.parameters)
+        return replace(point, parameters=np.maximum(values, [p.lower for p in point.structure.parameters]))
 
     def gain(self, parent: Explanation, name: str, values: list[Array], is_thorough: bool) -> float:
         """See host.diagnosis.prospects, as for `form_gains`: here for the workers to call."""
@@ -164,6 +177,11 @@ class Fitter:
         """The parent's set without one of its effects; not polished."""
         names = parent.names - {name}
         start = self.point(names, parent)
+        ahead = one_step_without(parent.fit, named(name))
+        if ahead is not None and not parent.fit.has_process_noise:
+            known = dict(zip(parent.fit.structure.names, ahead[1].tolist(), strict=True))
+            moved = replace(start, parameters=np.array([known[own] for own in start.structure.names]))
+            start = min(start, moved, key=lambda point: free_run_cost(point, self.inputs(names)))
         starts = [start]
         if self.excess(parent.fit) > FAR:
             starts.append(self._guess(start, names))
@@ -197,9 +215,11 @@ class Fitter:
             for recording in self.recordings
         ]
         start = Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0]))
-        free, inputs = self.free(explanation.names), self.inputs(explanation.names)
-        starts = [start, annealed(start, inputs, free, self.accelerations)]
-        return self.polished(self._explained(explanation.names, self._fit(starts)))
+        fit = self._fit([start])
+        if self.excess(fit) > NOT_THERE * self.excess(explanation.fit):
+            moved = annealed(start, self.inputs(explanation.names), fit.free, self.accelerations)
+            fit = self._fit([start, moved])
+        return self.polished(self._explained(explanation.names, fit))
 
     def free(self, names: Names) -> Mask:
         """Which parameters of a set are estimated."""

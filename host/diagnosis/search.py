@@ -15,6 +15,7 @@ from math import inf, log
 
 from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, ORDINARY, PITCHING_INTO_DEPTH, named
 from host.catalogue.nuisance import FREE_TRIM
+from host.diagnosis.absence import one_step_without
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter, is_time, measure_alike
 from host.diagnosis.workers import Task, Workers
@@ -34,6 +35,7 @@ POLISHED = 3
 SMALL = 3  # members; the fits of larger sets cost most, and an exchange of one says least
 ROUGH = 60.0  # of BIC, that a fit of the search may gain by polishing
 LARGEST_SET = 4
+CLEARLY = 20.0  # times the margin: no doubt is left that a member is needed
 NEAR = 1.15  # times the noise floor: little is left, and gains are well predicted
 MOST_ROUNDS = 4
 
@@ -65,7 +67,7 @@ class Search:
         for explanation in (self.base, *(also or [])):
             self.remember(explanation)
         beam = [self.remember(self.root)]
-        if self.part is not None:
+        if self.part is not None or any(len(e.names) > LARGEST_SET for e in also or []):
             self.on_progress("settling")
             settled = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
             return self._settled(min(settled, key=lambda e: e.bic))
@@ -86,6 +88,8 @@ class Search:
         Parsimony chooses a name, but excludes no other: of two that fit alike, the one with more coefficients
         is charged as a forecast would be (Akaike), not by what it costs to prefer it.
         """
+        if self.part is not None and len(best.names) > LARGEST_SET and best.names in self.part.tried:
+            return self.part.twins(self.part.tried[best.names], name)
         exchanged = {
             next(iter(names - best.names)): explanation
             for names, explanation in self.tried.items()
@@ -109,10 +113,11 @@ class Search:
         return self.each_without(best, [name])[0]
 
     def each_without(self, best: Explanation, members: list[str]) -> list[Explanation]:
-        """The set less each of these members."""
+        """The set less each of these members; of a large one, what is far from it is fitted roughly."""
         sets = [best.names - {name} for name in members]
         self._shrink(best, [names for names in sets if names not in self.tried])
-        self._polish([names for names in sets if names in self._shrunk])
+        limit = best.bic + (ROUGH if len(best.names) > LARGEST_SET else inf)
+        self._polish([names for names in sets if names in self._shrunk and self.tried[names].bic < limit])
         return [self.tried[names] for names in sets]
 
     def gain_alone(self, name: str) -> float:
@@ -145,7 +150,7 @@ class Search:
 
     def pruned(self, explanation: Explanation) -> Explanation:
         """The set less the members that do not pay for themselves."""
-        given, doubtful = explanation, set(explanation.names)
+        given, doubtful = explanation, self._doubtful(explanation)
         while doubtful:
             smaller = {explanation.names - {member}: member for member in sorted(doubtful)}
             limit = explanation.bic + self.margin(explanation)
@@ -162,6 +167,14 @@ class Search:
         if explanation is not given:
             self._polish([explanation.names])
         return self.tried.get(explanation.names, explanation)
+
+    def _doubtful(self, explanation: Explanation) -> set[str]:
+        """The members worth trying without: of a large set, where each takes long, not the clearly needed."""
+        if len(explanation.names) <= LARGEST_SET:
+            return set(explanation.names)
+        losses = {name: one_step_without(explanation.fit, named(name)) for name in explanation.names}
+        enough = CLEARLY * self.margin(explanation)
+        return {name for name, ahead in losses.items() if ahead is None or ahead[0] < enough}
 
     def _shrink(self, explanation: Explanation, smaller: Iterable[Names]) -> None:
         """Fits sets of one member less roughly, once."""
@@ -255,6 +268,8 @@ class Search:
         (best,) = self._across([best])
         for _ in range(MOST_ROUNDS):
             best = self.pruned(best)
+            if self.part is not None and len(best.names) > LARGEST_SET:
+                break  # exchanged there
             rival = self.exchanged(best)
             if rival is best:
                 break

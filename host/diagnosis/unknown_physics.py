@@ -30,7 +30,10 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
         if better.bic > best.bic - search.margin(better):
             break
         best = better
-    return search.exchanged(search.pruned(best)) if _is_large(best) else best
+    if not _is_large(best):
+        return best
+    best = search.pruned(best)
+    return best if search.part is not None else search.exchanged(best)
 
 
 def unknown_in(explanation: Explanation) -> list[str]:

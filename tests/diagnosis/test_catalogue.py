@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hidden_dive import BASE, hidden_dive
 
-from host.catalogue import BY_NAME, CATALOGUE, structure_of
+from host.catalogue import BY_NAME, CATALOGUE, UNKNOWN, structure_of
 from host.propagate import free_run, innovations, inputs_of
 
 NAMES_OF_THE_FORMAT = {
@@ -76,6 +76,23 @@ def test_a_low_centre_of_gravity_feels_a_change_of_speed() -> None:
     run = free_run(np.array([*BASE.values(), 0.0, 0.0, 1.0]), np.array([0.0, 0.0, 0.0, 20.0]), inputs)
     settled = run.outputs[0, 150:250]
     np.testing.assert_allclose(settled, -0.05 / 9.80665, rtol=0.02)
+
+
+@pytest.mark.parametrize("name", sorted((BY_NAME | UNKNOWN).keys()))
+def test_an_effect_of_no_size_is_absent(name: str) -> None:
+    effect = (BY_NAME | UNKNOWN)[name]
+    if not effect.size_names:
+        pytest.skip("none of its parameters makes it absent")
+    recording = hidden_dive(duration=30.0)
+    probe = np.array(effect.probes[-1]) + 0.01
+    sizes = [parameter.name in effect.size_names for parameter in effect.parameters]
+    least = [max(parameter.lower, 0.0) for parameter in effect.parameters]  # a lag can only come near
+    values = np.concatenate([[*BASE.values(), 0.0, 0.0], np.where(sizes, least, probe)])
+    run = free_run(values, START, inputs_of(recording, structure_of((name,)))).outputs
+    plain = free_run(values[:8], START, inputs_of(recording)).outputs
+    # A lag time comes no nearer to zero than its bound.
+    near = max(least) * np.abs(np.diff(plain, axis=1)).max() / recording.step
+    assert np.abs(run - plain).max() < 1e-9 + 2.0 * near
 
 
 def test_an_unknown_effect_is_a_key_error() -> None:

@@ -1,0 +1,36 @@
+"""What a set loses without one of its effects, one Gauss-Newton step ahead.
+
+About the maximum the log-likelihood falls by 1/2 d^T M d for the information M. With the sizes s of the
+effect put to zero and its other parameters idle, the rest o follows by -M_oo^-1 M_os s, and the loss is
+1/2 s^T (M_ss - M_so M_oo^-1 M_os) s (half of Wald's statistic).
+"""
+
+import numpy as np
+
+from host.equations import Effect
+from host.fit import Fit
+from host.recording import Array
+
+
+def one_step_without(fit: Fit, effect: Effect) -> tuple[float, Array] | None:
+    """Twice the log-likelihood lost without the effect, and the whole set's parameters (n,) there.
+
+    None where no value of its parameters makes it absent.
+    """
+    names = np.array(fit.structure.names)
+    own = np.isin(names, [parameter.name for parameter in effect.parameters])
+    gone = np.isin(names, effect.size_names) & fit.free
+    if not gone.any():
+        return None
+    others = fit.free & ~own
+    M = fit.information
+    change = -fit.parameters[gone]
+    scale = np.sqrt(np.maximum(np.diag(M)[others], 1e-300))
+    normal = M[np.ix_(others, others)] / np.outer(scale, scale) + 1e-9 * np.eye(scale.size)
+    follow = -np.linalg.solve(normal, (M[np.ix_(others, gone)] @ change) / scale) / scale
+    loss = change @ M[np.ix_(gone, gone)] @ change + change @ M[np.ix_(gone, others)] @ follow
+    parameters = fit.parameters.copy()
+    parameters[gone] = 0.0
+    parameters[others] += follow
+    bounds = fit.structure.parameters
+    return float(loss), np.clip(parameters, [p.lower for p in bounds], [p.upper for p in bounds])
