@@ -39,7 +39,7 @@ def heldout_errors(path: Path, names: tuple[str, ...], start: dict[str, float]) 
     recordings = read_all([path], load_vehicle(None), lambda _: None)
     import numpy as np
 
-    from host.catalogue import OFFSETS
+    from host.catalogue.kin import OFFSETS
     from host.diagnosis.explanation import Explanation
     from host.diagnosis.fitter import Fitter
     from host.diagnosis.noise_floor import noise_floor

@@ -20,16 +20,6 @@ CATALOGUE: tuple[Effect, ...] = (
 BY_NAME = {effect.name: effect for effect in CATALOGUE}
 UNKNOWN = {effect.name: effect for effect in unknown.FORMS}
 _ALL = BY_NAME | UNKNOWN | {e.name: e for e in (nuisance.FREE_TRIM, unknown.ANY_SMOOTH_FORCE)}
-OFFSETS = ("net_buoyancy", "trim_moment", "rudder_offset", "pitch_bias", "vertical_current")
-"""Effects that do no more than shift the steady state, as nuisance.FREE_TRIM does without saying why."""
-PITCHING_INTO_DEPTH = (
-    "heave_pitch_rate_coupling",
-    "heave_pitch_acceleration_coupling",
-    "depth_sensor_lever_arm",
-    "depth_sensor_lag",
-)
-"""Effects that move the recorded depth with the pitch rate; the base, bent for each its own way, does the
-rest."""
 ORDINARY = (
     "heave_pitch_rate_coupling",
     "large_angle_kinematics",

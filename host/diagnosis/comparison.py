@@ -17,7 +17,7 @@ from scipy.stats import chi2
 from host.catalogue import named
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.search import NAMING_MARGIN
+from host.diagnosis.margins import NAMING_MARGIN
 from host.equations import NAMES, PARAMETERS
 from host.uncertainty import covariance
 

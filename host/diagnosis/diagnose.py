@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from host.catalogue import BY_NAME, CATALOGUE, UNKNOWN, named
+from host.diagnosis.exchange import twins
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import SEA_DOUBT, Leftover, leftover
@@ -166,7 +167,7 @@ def _named(search: Search, best: Explanation, spans: Spans, floor: Array, after:
             name=name,
             delta_bic=without.bic - best.bic,
             heldout_gain=1.0 - after.chi2 / misfit(without, spans, floor).chi2,
-            twins=search.twins(best, name),
+            twins=twins(search, best, name),
         )
         for name, without in zip(names, search.each_without(best, names), strict=True)
     ]

@@ -5,7 +5,8 @@ from math import log
 
 import numpy as np
 
-from host.catalogue import OFFSETS, named, structure_of
+from host.catalogue import named, structure_of
+from host.catalogue.kin import OFFSETS, as_trim, measure_alike
 from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import SPANS
 from host.diagnosis.absence import one_step_without
@@ -13,7 +14,7 @@ from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations, first_guess
 from host.diagnosis.noise_floor import noise_floor
 from host.diagnosis.prospects import form_gains, gain, probed
-from host.equations import NAMES, Effect
+from host.equations import NAMES
 from host.filter_error import filter_error, filter_error_from
 from host.fit import Fit
 from host.gauss_newton import Mask, Point
@@ -94,11 +95,11 @@ class Fitter:
         known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
         shift = np.zeros(2)
         for name in explanation.names & {FREE_TRIM.name, *OFFSETS}:
-            shift += _as_trim(known, name) @ [known[p.name] for p in named(name).parameters]
+            shift += as_trim(known, name) @ [known[p.name] for p in named(name).parameters]
         chosen = sorted(offsets)
         if not chosen and COMPRESSED in names:  # its neutral depth takes over
             known["neutral_depth"] -= shift[0] / (known["c_wz"] or np.inf)
-        table = np.hstack([np.zeros((2, 0)), *(_as_trim(known, name) for name in chosen)])
+        table = np.hstack([np.zeros((2, 0)), *(as_trim(known, name) for name in chosen)])
         values = np.linalg.lstsq(table, shift, rcond=1e-8)[0] if chosen else np.zeros(0)
         known |= {named(n).parameters[0].name: float(v) for n, v in zip(chosen, values, strict=True)}
         structure = structure_of(names)
@@ -317,35 +318,6 @@ class Fitter:
         if start.noise[2:].any():
             return filter_error_from(start, inputs, free)
         return output_error(start, inputs, free)
-
-
-def _as_trim(known: dict[str, float], name: str) -> Array:
-    """Constant force and moment that one unit of an offset is: (2, its parameters).
-
-    A climb is held by force / -a1.
-    """
-    a1, a3, u0, b1, b2 = (known[parameter] for parameter in ("a1", "a3", "u0", "b1", "b2"))
-    columns = {
-        FREE_TRIM.name: [[1.0, 0.0], [0.0, 1.0]],
-        "net_buoyancy": [[1.0], [0.0]],
-        "trim_moment": [[0.0], [1.0]],
-        "rudder_offset": [[b1], [b2]],
-        "pitch_bias": [[-a1 * u0], [-a3]],
-        "vertical_current": [[-a1], [0.0]],
-    }
-    return np.array(columns[name])
-
-
-def is_time(effect: Effect) -> bool:
-    """Whether a delay or a time constant is all that it has."""
-    return [parameter.unit for parameter in effect.parameters] == ["s"]
-
-
-def measure_alike(one: Effect, other: Effect) -> bool:
-    """Whether the first parameter of one suits the other: both delay, or share a slot and the unit."""
-    if is_time(one) and is_time(other):
-        return True
-    return (one.slot, one.parameters[0].unit) == (other.slot, other.parameters[0].unit)
 
 
 def _first(values: Array) -> float:

@@ -11,30 +11,23 @@ each may look idle or be mistaken until the others are there.
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from itertools import combinations
-from math import inf, log
+from math import inf
 
-from host.catalogue import BY_NAME, CATALOGUE, OFFSETS, ORDINARY, PITCHING_INTO_DEPTH, named
+from host.catalogue import CATALOGUE, ORDINARY, named
+from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.absence import one_step_without
+from host.diagnosis.exchange import exchanged
 from host.diagnosis.explanation import Explanation, Names
-from host.diagnosis.fitter import Fitter, is_time, measure_alike
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.margins import FEW, LARGEST_SET, NAMING_MARGIN, ROUGH, SMALL, margin
 from host.diagnosis.workers import Task, Workers
 from host.recording import Array
-from host.whiteness import correlation_factor
 
-NAMING_MARGIN = 6.0  # of BIC, beyond which an effect pays; holds false naming down over the whole catalogue
-TWIN_MARGIN = 8.0  # of BIC, odds of 50 to 1: explanations closer than this cannot be told apart
-LARGEST_CLASS = 3  # a longer list of alternatives helps nobody
 BEAM = 4  # single effects carried on
 FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
 NARROW = 2  # of larger sets, which cost most and of which there are most
-PROMISING, FEW = 6, 3
-RIVALS = 5
-ALIKE = 0.95  # of the largest gain predicted
-POLISHED = 3
-SMALL = 3  # members; the fits of larger sets cost most, and an exchange of one says least
-ROUGH = 60.0  # of BIC, that a fit of the search may gain by polishing
-LARGEST_SET = 4
+PROMISING = 6
 CLEARLY = 20.0  # times the margin: no doubt is left that a member is needed
 NEAR = 1.15  # times the noise floor: little is left, and gains are well predicted
 MOST_ROUNDS = 4
@@ -49,6 +42,7 @@ class Search:
     base  the paper's equations alone, `root` the same with a free trim; all that is tried grows from it, with
           random forces where the root has them
     part  the search over an excerpt of the recordings that this one goes on from
+    rivals  sets that were fitted in an exchange
     """
 
     fitter: Fitter
@@ -58,7 +52,7 @@ class Search:
     root: Explanation
     part: "Search | None" = None
     tried: dict[Names, Explanation] = field(default_factory=dict)
-    _rivals: set[Names] = field(default_factory=set)  # those fitted in the place of another
+    rivals: set[Names] = field(default_factory=set)
     _shrunk: set[Names] = field(default_factory=set)  # those fitted from a larger set
     _polished: set[Names] = field(default_factory=set)  # those of them fitted to the end
 
@@ -77,36 +71,10 @@ class Search:
             grown = self._grown(beam, size)
             best_before = min(e.bic for e in beam)
             beam = self._parents(grown)[: BEAM if size == 1 else NARROW]
-            if not beam or beam[0].bic > best_before - self.margin(beam[0]):
+            if not beam or beam[0].bic > best_before - margin(beam[0]):
                 break
         self.on_progress("settling")
         return self._settled(self._retrimmed())
-
-    def twins(self, best: Explanation, name: str) -> list[str]:
-        """The effects that would do the work of one member as well, or nearly: the two closest.
-
-        Parsimony chooses a name, but excludes no other: of two that fit alike, the one with more coefficients
-        is charged as a forecast would be (Akaike), not by what it costs to prefer it.
-        """
-        if self.part is not None and len(best.names) > LARGEST_SET and best.names in self.part.tried:
-            return self.part.twins(self.part.tried[best.names], name)
-        exchanged = {
-            next(iter(names - best.names)): explanation
-            for names, explanation in self.tried.items()
-            if len(names) == len(best.names) and best.names - names == {name}
-        }
-        limit = TWIN_MARGIN * correlation_factor(best.fit.whitened)
-        close = {
-            other: explanation.bic
-            for other, explanation in exchanged.items()
-            if other in BY_NAME and explanation.bic - best.bic - self._excess(explanation, best) < limit
-        }
-        return sorted(close, key=lambda other: close[other])[: LARGEST_CLASS - 1]
-
-    def _excess(self, explanation: Explanation, best: Explanation) -> float:
-        """Of BIC, what more coefficients than the best set has are charged beyond Akaike's 2 for each."""
-        more = self.fitter.free_parameters(explanation.names) - self.fitter.free_parameters(best.names)
-        return max(more, 0) * (log(best.fit.samples) - 2.0)
 
     def without(self, best: Explanation, name: str) -> Explanation:
         """The set less one member."""
@@ -140,20 +108,20 @@ class Search:
         """Twice the log-likelihood each effect could gain on top of the parent, predicted."""
         others = [name for name in _candidates(parent) if among is None or name in among]
         found = self.workers.results(
-            [("gain", (parent, name, self._values(name), is_thorough)) for name in others]
+            [("gain", (parent, name, self.values(name), is_thorough)) for name in others]
         )
         return dict(zip(others, found, strict=True))
 
     def growth(self, parent: Explanation, name: str) -> Task:
         """The fit of a set with one effect, or form of unknown physics, more."""
-        return "grown", (parent, name, self._values(name))
+        return "grown", (parent, name, self.values(name))
 
     def pruned(self, explanation: Explanation) -> Explanation:
         """The set less the members that do not pay for themselves."""
         given, doubtful = explanation, self._doubtful(explanation)
         while doubtful:
             smaller = {explanation.names - {member}: member for member in sorted(doubtful)}
-            limit = explanation.bic + self.margin(explanation)
+            limit = explanation.bic + margin(explanation)
             self._shrink(explanation, smaller)
             if all(self.tried[names].bic > limit for names in smaller):
                 self._polish([names for names in smaller if self.tried[names].bic < limit + ROUGH])
@@ -173,7 +141,7 @@ class Search:
         if len(explanation.names) <= LARGEST_SET:
             return set(explanation.names)
         losses = {name: one_step_without(explanation.fit, named(name)) for name in explanation.names}
-        enough = CLEARLY * self.margin(explanation)
+        enough = CLEARLY * margin(explanation)
         return {name for name, ahead in losses.items() if ahead is None or ahead[0] < enough}
 
     def _shrink(self, explanation: Explanation, smaller: Iterable[Names]) -> None:
@@ -198,9 +166,9 @@ class Search:
             self.tried[explanation.names] = explanation.lean()
         return self.tried[explanation.names]
 
-    def margin(self, explanation: Explanation) -> float:
-        """What a member must gain beside this set: correlated residuals repeat each other's evidence."""
-        return NAMING_MARGIN * correlation_factor(explanation.fit.whitened)
+    def across(self, explanations: list[Explanation]) -> list[Explanation]:
+        """Each in its likeliest valley."""
+        return [self.remember(e) for e in self.workers.results([("across", (e,)) for e in explanations])]
 
     def _ordinary_suffices(self, leading: Explanation) -> bool:
         """Whether all that every vehicle has, tried if the leading small set leaves much, leaves little."""
@@ -212,7 +180,7 @@ class Search:
         self.on_progress("what every vehicle has")
         for name in ORDINARY:
             if name not in joint.names:
-                joint = self.fitter.grown(joint, name, self._values(name))
+                joint = self.fitter.grown(joint, name, self.values(name))
         joint = self.remember(self.fitter.polished(joint))
         if joint.bic > leading.bic:
             return False
@@ -254,7 +222,7 @@ class Search:
         is_far &= not self.root.fit.has_process_noise
         return [name for name in others if name in worth or (is_far and named(name).is_common)]
 
-    def _values(self, name: str) -> list[Array]:
+    def values(self, name: str) -> list[Array]:
         """Where a fit of this effect alone ended: a better start than its probes."""
         alone = self._alone(name)
         if alone is None:
@@ -265,12 +233,12 @@ class Search:
 
     def _settled(self, best: Explanation) -> Explanation:
         """Prunes and exchanges members of the set until neither helps, in the likeliest valley."""
-        (best,) = self._across([best])
+        (best,) = self.across([best])
         for _ in range(MOST_ROUNDS):
             best = self.pruned(best)
             if self.part is not None and len(best.names) > LARGEST_SET:
                 break  # exchanged there
-            rival = self.exchanged(best)
+            rival = exchanged(self, best)
             if rival is best:
                 break
             best = rival
@@ -294,7 +262,7 @@ class Search:
             tasks = [("retrimmed", (e, way)) for e in polished for way in ways]
             explained += [self.remember(e) for e in self.workers.results(tasks)]
             best = min(explained, key=lambda e: e.bic)
-            if best.bic < leading.bic + self.margin(leading):
+            if best.bic < leading.bic + margin(leading):
                 break
         return best
 
@@ -304,70 +272,6 @@ class Search:
             self.root.names <= names < explanation.names and smaller.bic < explanation.bic + NAMING_MARGIN
             for names, smaller in self.tried.items()
         )
-
-    def exchanged(self, best: Explanation) -> Explanation:
-        """The best set with one member exchanged for another, where that is better still; else itself."""
-        fewer = self.each_without(best, sorted(best.names))
-        tasks: dict[Names, Task] = {}
-        is_small, is_large = len(best.names) <= SMALL, len(best.names) > LARGEST_SET
-        for smaller in fewer:
-            (member,) = best.names - smaller.names
-            kin = {e.name for e in CATALOGUE if self._is_kin(e.name, member)}
-            gains = self.gains(smaller, is_small, kin if is_large else None)
-            rivals = self._likely(gains, smaller.bic - best.bic, RIVALS if is_small else FEW)
-            kin &= gains.keys()
-            rivals |= kin if is_small else {name for name in kin if is_time(named(name))}
-            for name in sorted(rivals - best.names):
-                beside = best if name in kin else None
-                fits = ("grown", (smaller, name, self._values(name), beside))
-                tasks.setdefault(smaller.names | {name}, fits)
-            if member in OFFSETS and not is_large:
-                kept = smaller.names & {*OFFSETS}
-                for name in {*OFFSETS} - best.names:
-                    tasks[smaller.names | {name}] = ("retrimmed", (best, kept | {name}))
-        tasks = {names: task for names, task in tasks.items() if names not in self._rivals}
-        self._rivals.update(tasks)
-        grown = [self.remember(e) for e in self.workers.results(list(tasks.values()))]
-        if is_small:
-            grown += self._across([e for e in grown if self._moves_depth(e, best)])
-        # Twins may lie at the far end of a curved valley, where a short fit does not come.
-        first = sorted(grown, key=lambda e: e.bic)
-        least = POLISHED if is_small else 1
-        close = [e for k, e in enumerate(first) if k < least or e.bic < best.bic + 4.0 * TWIN_MARGIN]
-        close = [self.remember(e) for e in self.workers.results([("polished", (e,)) for e in close])]
-        # Two members may stand for what one does that was not there: with it they are no longer needed.
-        close = [e for e in close if e.bic < best.bic + self.margin(best)]
-        leaner = (self.pruned(e) if 1 < len(e.names) <= SMALL else e for e in close)
-        rival = min(leaner, key=lambda e: e.bic, default=best)
-        return rival if rival.bic < best.bic - 0.01 else best
-
-    def _across(self, explanations: list[Explanation]) -> list[Explanation]:
-        """Each in its likeliest valley."""
-        return [self.remember(e) for e in self.workers.results([("across", (e,)) for e in explanations])]
-
-    def _moves_depth(self, rival: Explanation, best: Explanation) -> bool:
-        """Whether the exchange is one of near twins among which the base bends most."""
-        return (rival.names ^ best.names) <= {*PITCHING_INTO_DEPTH}
-
-    def _likely(self, gains: dict[str, float], worth: float, count: int) -> set[str]:
-        """Those predicted to do most of what a member is worth, and all that promise as much as the best.
-
-        A fit far from the recording promises less than there is, but the same to all that mend it.
-        """
-        most = max(gains.values(), default=0.0)
-        likely = [name for name in gains if gains[name] > 0.5 * min(worth, most)]
-        ordered = sorted(likely, key=lambda name: -gains[name])
-        return {name for k, name in enumerate(ordered) if k < count or gains[name] > ALIKE * most}
-
-    def _is_kin(self, name: str, member: str) -> bool:
-        """Whether prediction may misjudge its gain: they measure alike, or share an end of it and pay."""
-        if name == member:
-            return False
-        if measure_alike(named(name), named(member)) or {name, member} <= {*PITCHING_INTO_DEPTH}:
-            return True
-        pays = self.gain_alone(name) > NAMING_MARGIN
-        slots = {named(name).slot, named(member).slot}
-        return pays and (len(slots) == 1 or slots == {"actuator", "sensor"})
 
 
 def _candidates(parent: Explanation) -> list[str]:

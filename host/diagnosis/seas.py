@@ -7,7 +7,8 @@ import numpy as np
 from host.catalogue.environment import WAVE_PERIODS
 from host.catalogue.unknown import SWINGING_MOMENT
 from host.diagnosis.explanation import Explanation
-from host.diagnosis.search import NAMING_MARGIN, Search
+from host.diagnosis.margins import NAMING_MARGIN
+from host.diagnosis.search import Search
 
 WAVES = "surface_waves"
 

@@ -16,7 +16,8 @@ from host.diagnosis.diagnose import Diagnosis
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.manoeuvres import Manoeuvre, library
-from host.diagnosis.search import TWIN_MARGIN, Progress
+from host.diagnosis.margins import TWIN_MARGIN
+from host.diagnosis.search import Progress
 from host.equations import NAMES, Effect, Slot
 from host.filter_error import whitened_innovations
 from host.gauss_newton import GaussNewton, Point

@@ -7,8 +7,10 @@ large as the search goes grows only in competition with these forms.
 """
 
 from host.catalogue import BY_NAME, UNKNOWN
+from host.diagnosis.exchange import exchanged
 from host.diagnosis.explanation import Explanation
-from host.diagnosis.search import FEW, LARGEST_SET, NAMING_MARGIN, SMALL, Search
+from host.diagnosis.margins import FEW, LARGEST_SET, NAMING_MARGIN, SMALL, margin
+from host.diagnosis.search import Search
 
 PROMISING = 2  # forms beside each set that are fitted in earnest
 FAIR_PART = 0.3  # of what a member was worth, that a form in its place must promise: predictions are local
@@ -27,13 +29,13 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
         # Of a large set each member costs a long fit to try without: that waits until all have joined.
         leaner = grown if _is_large(best) else map(search.pruned, grown)
         better = min(leaner, key=lambda e: e.bic, default=best)
-        if better.bic > best.bic - search.margin(better):
+        if better.bic > best.bic - margin(better):
             break
         best = better
     if not _is_large(best):
         return best
     best = search.pruned(best)
-    return best if search.part is not None else search.exchanged(best)
+    return best if search.part is not None else exchanged(search, best)
 
 
 def unknown_in(explanation: Explanation) -> list[str]:
@@ -76,7 +78,7 @@ def _grown(search: Search, best: Explanation) -> list[Explanation]:
     if len(known_in(best)) >= LARGEST_SET:
         gains = search.gains(best, is_thorough=False)
         for name in sorted(gains, key=lambda name: -gains[name])[:FEW]:
-            if gains[name] > search.margin(best):
+            if gains[name] > margin(best):
                 chosen[best.names | {name}] = best, name
     grown = search.workers.results([search.growth(parent, name) for parent, name in chosen.values()])
     polished = search.workers.results([("polished", (e,)) for e in grown])

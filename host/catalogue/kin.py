@@ -1,0 +1,47 @@
+"""Which effects resemble one another in what a recording shows of them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from host.catalogue.nuisance import FREE_TRIM
+from host.equations import Effect
+
+OFFSETS = ("net_buoyancy", "trim_moment", "rudder_offset", "pitch_bias", "vertical_current")
+"""Effects that do no more than shift the steady state, as nuisance.FREE_TRIM does without saying why."""
+PITCHING_INTO_DEPTH = (
+    "heave_pitch_rate_coupling",
+    "heave_pitch_acceleration_coupling",
+    "depth_sensor_lever_arm",
+    "depth_sensor_lag",
+)
+"""Effects that move the recorded depth with the pitch rate; the base, bent for each its own way, does the
+rest."""
+
+
+def is_time(effect: Effect) -> bool:
+    """Whether a delay or a time constant is all that it has."""
+    return [parameter.unit for parameter in effect.parameters] == ["s"]
+
+
+def measure_alike(one: Effect, other: Effect) -> bool:
+    """Whether the first parameter of one suits the other: both delay, or share a slot and the unit."""
+    if is_time(one) and is_time(other):
+        return True
+    return (one.slot, one.parameters[0].unit) == (other.slot, other.parameters[0].unit)
+
+
+def as_trim(known: dict[str, float], name: str) -> NDArray[np.float64]:
+    """Constant force and moment that one unit of an offset is: (2, its parameters).
+
+    A climb is held by force / -a1.
+    """
+    a1, a3, u0, b1, b2 = (known[parameter] for parameter in ("a1", "a3", "u0", "b1", "b2"))
+    columns = {
+        FREE_TRIM.name: [[1.0, 0.0], [0.0, 1.0]],
+        "net_buoyancy": [[1.0], [0.0]],
+        "trim_moment": [[0.0], [1.0]],
+        "rudder_offset": [[b1], [b2]],
+        "pitch_bias": [[-a1 * u0], [-a3]],
+        "vertical_current": [[-a1], [0.0]],
+    }
+    return np.array(columns[name])

@@ -1,0 +1,66 @@
+"""What may stand in the place of a member is found, also where no prediction ranks it."""
+
+import numpy as np
+import pytest
+from hidden_dive import hidden_dive
+
+from host.catalogue.nuisance import FREE_TRIM
+from host.diagnosis.exchange import _likely, exchanged, twins
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.search import Search
+from host.diagnosis.workers import Workers
+from host.recording import Array
+
+
+def out_of_trim(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+    return 0.0, 0.03, 0.0
+
+
+@pytest.fixture(scope="module")
+def fitter() -> Fitter:
+    return Fitter([hidden_dive(out_of_trim, duration=60.0)])
+
+
+def test_all_that_mend_a_bad_fit_alike_are_likely() -> None:
+    # Where the parent is far off, each repair promises the same, and less than it is worth.
+    gains = {f"repair {k}": 430.0 - k for k in range(8)} | {"idle": 3.0, "weak": 200.0}
+    assert _likely(gains, worth=1200.0, count=3) == {f"repair {k}" for k in range(8)}
+    # Where it is near, the few best that do most of the work.
+    gains = {"best": 90.0, "second": 70.0, "third": 60.0, "fourth": 55.0, "idle": 3.0}
+    assert _likely(gains, worth=88.0, count=3) == {"best", "second", "third"}
+    assert _likely({"hopeless": -50.0}, worth=20.0, count=3) == set()
+
+
+def test_one_offset_becomes_another_of_the_same_force_and_moment(fitter: Fitter) -> None:
+    moment = fitter.polished(fitter.grown(fitter.base, "trim_moment", []))
+    plane = fitter.retrimmed(moment, frozenset({"rudder_offset"}))
+    assert plane.names == {"rudder_offset"}
+    # The plane's zero is a force in heave as well, which this dive tells apart.
+    assert fitter.base.bic - 100.0 > plane.bic > moment.bic
+    known = dict(zip(plane.fit.structure.names, plane.fit.parameters, strict=True))
+    assert 0.015 < known["rudder_zero"] * known["b2"] < 0.03
+
+
+def test_each_offset_is_tried_in_the_place_of_another(fitter: Fitter) -> None:
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.trimmed())
+        best = search.remember(fitter.polished(fitter.grown(fitter.base, "rudder_offset", [])))
+        better = exchanged(search, best)
+        offsets = ("trim_moment", "pitch_bias", "net_buoyancy", "vertical_current")
+        assert all(frozenset({name}) in search.tried for name in offsets)
+        assert better.bic <= best.bic
+        told = {*better.names, *twins(search, better, next(iter(better.names)))}
+        assert "trim_moment" in told
+
+
+def test_a_neutral_depth_stands_still_beside_a_free_trim(fitter: Fitter) -> None:
+    names = frozenset({FREE_TRIM.name, "depth_dependent_buoyancy"})
+    with_trim = fitter.grown(fitter.trimmed(), "depth_dependent_buoyancy", [])
+    assert fitter.free_parameters(names) == 3
+    assert fitter.free_parameters(frozenset({"depth_dependent_buoyancy"})) == 2
+    neutral = with_trim.fit.structure.names.index("neutral_depth")
+    assert not with_trim.fit.free[neutral]
+    # Without the trim the neutral depth takes its force over, so that nothing is lost.
+    alone = fitter.retrimmed(with_trim, frozenset({"trim_moment"}))
+    assert alone.fit.free[neutral]
+    assert np.isclose(alone.fit.log_likelihood, with_trim.fit.log_likelihood, atol=3.0)
