@@ -57,15 +57,19 @@ def other_valleys(fit: Fit, inputs: list[Inputs]) -> list[Fit]:
 
 
 def plausibility(fit: Fit) -> float:
-    """By what ends of searches are compared: log-likelihood, and the log of the prior of a speed not held.
+    """By what ends of searches are compared: log-likelihood, and the log of the prior of its speed."""
+    return fit.log_likelihood + log_prior(fit)
 
-    That is log-normal about 1.5 m/s with a factor of 3: whatever the data say decides, but that the vehicle
-    hardly moves forward.
+
+def log_prior(fit: Fit) -> float:
+    """Of a speed that is not held: log-normal about 1.5 m/s with a factor of 3.
+
+    Whatever the data say decides, but that the vehicle hardly moves forward.
     """
     if not fit.free[U0]:
-        return fit.log_likelihood
+        return 0.0
     factors = log(max(fit.parameters[U0], 1e-3) / USUAL_SPEED) / log(SPEED_FACTOR)
-    return fit.log_likelihood - 0.5 * factors**2
+    return -0.5 * factors**2
 
 
 def with_rivals(fit: Fit, others: list[Fit]) -> Fit:

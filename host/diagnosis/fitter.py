@@ -23,7 +23,7 @@ from host.output_error import annealed, free_run_cost, output_error
 from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
 from host.recording import Array, Recording
 from host.rounding import thinned
-from host.valleys import other_valleys, plausibility, with_rivals
+from host.valleys import log_prior, other_valleys, with_rivals
 from host.wave_forces import wave_forces, wave_forces_from
 
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
@@ -240,7 +240,7 @@ class Fitter:
         the periods that an oscillation could have had.
         """
         rare = sum(not named(name).is_common for name in names)
-        unlikely = 2.0 * (fit.log_likelihood - plausibility(fit))
+        unlikely = -2.0 * log_prior(fit)
         chosen = sum(2.0 * log(self._periods_within(named(name).periods)) for name in names)
         return fit.bic + self.free_parameters(names) * log(fit.samples) + RARITY * rare + unlikely + chosen
 

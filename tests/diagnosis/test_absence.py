@@ -8,6 +8,8 @@ from host.catalogue import named
 from host.diagnosis.absence import one_step_without
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
+from host.fit import run_away
+from host.gauss_newton import Point
 from host.recording import Array
 
 
@@ -54,3 +56,10 @@ def test_a_set_does_no_worse_than_with_a_member_less(fitted: tuple[Fitter, Expla
         fitter.grown(fitter.base, "heave_pitch_rate_coupling", []), "heave_quadratic_drag", far
     )
     assert more.fit.log_likelihood > both.fit.log_likelihood - 2.0
+
+
+def test_a_set_that_runs_away_is_the_worst_of_all(fitted: tuple[Fitter, Explanation]) -> None:
+    fitter, both = fitted
+    start = Point(both.fit.structure, both.fit.parameters, both.fit.initial, both.fit.noise)
+    lost = run_away(start, fitter.inputs(both.names), both.fit.free)
+    assert fitter.bic(lost, both.names) == np.inf

@@ -55,6 +55,7 @@ def test_a_vehicle_that_hardly_moves_forward_must_earn_it(two_ends: tuple[Fit, F
     assert at(USUAL_SPEED) == best.log_likelihood
     assert best.log_likelihood - 1.5 < at(0.3) < best.log_likelihood
     assert at(0.0) < best.log_likelihood - 15.0
+    assert plausibility(replace(best, log_likelihood=-np.inf)) == -np.inf
 
 
 def test_rivals_widen_the_deviations_by_their_chance(two_ends: tuple[Fit, Fit, list[Inputs]]) -> None:
