@@ -22,6 +22,7 @@ from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.unknown_physics import known_in, unknown_in, with_unknown
 from host.diagnosis.workers import Workers
 from host.equations import NAMES, Slot
+from host.identifiability import ambiguity
 from host.outliers import without_outliers
 from host.recording import Array, Recording
 from host.uncertainty import covariance
@@ -133,7 +134,7 @@ def diagnose(
         location=locate(longest, errors, floor, values["u0"]),
         force=unknown_force(longest, {n: values[n] for n in NAMES}, floor, fitter.accelerations),
         ranking=_ranking(search),
-        remaining=_remaining(verdict, model, left, after),
+        remaining=" ".join([_remaining(verdict, model, left, after), *_other_answers(extended)]),
         has_sea=has_sea,
         bic=best.bic,
         std=std,
@@ -222,6 +223,12 @@ def _ranking(search: Search) -> list[tuple[str, float]]:
     """What each effect alone improves the information criterion by, best first."""
     alone = [(effect.name, search.gain_alone(effect.name)) for effect in CATALOGUE]
     return sorted((pair for pair in alone if pair[1] > -inf), key=lambda pair: -pair[1])
+
+
+def _other_answers(extended: Explanation) -> list[str]:
+    """Of the same physics with other coefficients, which the deviations include."""
+    fit = extended.fit
+    return [ambiguity(fit.parameters, rival.parameters) for rival in fit.rivals]
 
 
 def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit) -> str:
