@@ -15,6 +15,9 @@ from functools import cached_property
 from typing import Literal
 
 import casadi as ca
+import numpy as np
+
+from host.recording import Array
 
 Slot = Literal["heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment"]
 STATES = ("w", "q", "theta", "zeta")
@@ -150,6 +153,10 @@ class Structure:
     @cached_property
     def names(self) -> tuple[str, ...]:
         return tuple(parameter.name for parameter in self.parameters)
+
+    def clipped(self, parameters: Array) -> Array:
+        """The parameters (n,) within their bounds."""
+        return np.clip(parameters, [p.lower for p in self.parameters], [p.upper for p in self.parameters])
 
     @cached_property
     def states(self) -> tuple[str, ...]:

@@ -85,16 +85,21 @@ def open_combinations(parameters: Array, covariance: Array, free: Mask) -> list[
 def ambiguity(parameters: Array, rival: Array) -> str:
     """A sentence about another mode that explains the recording almost as well."""
     values = zip(NAMES, parameters.tolist(), rival.tolist(), strict=False)
-    apart = {
-        name: (one, other)
-        for name, one, other in values
-        if name in JUDGED and abs(other - one) > 0.1 * abs(one)
-    }
+    both = {name: (one, other) for name, one, other in values if name in JUDGED and other != one}
+    if not both:
+        return "Two answers explain the recording almost equally well: they differ in the effects alone."
+    apart = {name: pair for name, pair in both.items() if _change(pair) > 0.1}
+    apart = apart or {name: both[name] for name in [max(both, key=lambda name: _change(both[name]))]}
     listed = ", ".join(f"{name} = {other:.4g} instead of {one:.4g}" for name, (one, other) in apart.items())
     return (
         f"Two answers explain the recording almost equally well; the other has {listed}. "
         f"To decide: {_telling_apart(set(apart))}."
     )
+
+
+def _change(pair: tuple[float, float]) -> float:
+    """Of the second value against the first."""
+    return abs(pair[1] - pair[0]) / max(abs(pair[0]), 1e-12)
 
 
 def _worthless(parameters: Array) -> dict[str, float]:

@@ -60,11 +60,7 @@ def fit_maximum_likelihood(
         starts = [(np.concatenate([base, own]), initial) for base, initial in start_values(recordings)]
     candidates = []
     for parameters, initial in starts:
-        parameters = np.clip(
-            parameters,
-            [parameter.lower for parameter in structure.parameters],
-            [parameter.upper for parameter in structure.parameters],
-        )
+        parameters = structure.clipped(parameters)
         for name, value in held.items():
             parameters[structure.names.index(name)] = value
         on_progress("output error")

@@ -6,8 +6,6 @@ import numpy as np
 
 from host.recording import Array, Recording
 
-SAMPLES_A_LEVEL = 1  # of a value that stays: with two, steps of 0.1 m still read as physics
-
 
 def quantum(pieces: list[Array]) -> float:
     """The step of a quantised channel; 0 where hardly any value repeats."""
@@ -21,9 +19,9 @@ def quantum(pieces: list[Array]) -> float:
 def thinned(recordings: list[Recording]) -> list[Recording]:
     """The recordings with as many values of a quantised channel as its level changes tell.
 
-    While a value stays the same its rounding error is one error, not as many as there are rows: a fit that
-    takes them for independent finds physics in the steps of the rounding. A channel whose noise makes it
-    change level all the time, or that has no steps, stays whole.
+    While a value stays the same its rounding error is one error, not as many as there are rows, nor two: a
+    fit that takes them for independent finds physics in the steps of the rounding. A channel whose noise
+    makes it change level all the time, or that has no steps, stays whole.
     """
     depth = _thinned([r.depth for r in recordings])
     pitch = _thinned([r.pitch for r in recordings])
@@ -35,7 +33,7 @@ def _thinned(pieces: list[Array]) -> list[Array]:
         return pieces
     known = [piece[np.isfinite(piece)] for piece in pieces]
     changes = sum(int(np.count_nonzero(np.diff(values))) for values in known)
-    every = sum(values.size for values in known) // (SAMPLES_A_LEVEL * max(changes, 1))
+    every = sum(values.size for values in known) // max(changes, 1)
     if every < 2:
         return pieces
     kept = []

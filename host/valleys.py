@@ -12,8 +12,6 @@ it began; so the profile of the likelihood over a1 is walked on both sides, and 
 from dataclasses import replace
 from math import log
 
-import numpy as np
-
 from host.equations import NAMES
 from host.fit import Fit, Rival
 from host.gauss_newton import Point
@@ -43,12 +41,7 @@ def other_valleys(fit: Fit, inputs: list[Inputs]) -> list[Fit]:
     for stride in STRIDES:
         parameters = fit.parameters.copy()
         parameters[[A1, B1]] *= stride  # the steady heave velocity stays
-        parameters = np.clip(
-            parameters,
-            [parameter.lower for parameter in fit.structure.parameters],
-            [parameter.upper for parameter in fit.structure.parameters],
-        )
-        start = Point(fit.structure, parameters, fit.initial, fit.noise)
+        start = Point(fit.structure, fit.structure.clipped(parameters), fit.initial, fit.noise)
         walked = output_error(start, inputs, held, FEW_ITERATIONS, ROUGHLY)
         if walked.log_likelihood > fit.log_likelihood - WORTH_ENTERING:
             start = Point(fit.structure, walked.parameters, walked.initial, walked.noise)

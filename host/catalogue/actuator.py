@@ -8,6 +8,7 @@ from host.equations import Chain, Effect, Parameter
 
 def _offset(c: Chain) -> None:
     c.command = c.command + c.p["rudder_zero"]
+    c.earlier = [command + c.p["rudder_zero"] for command in c.earlier]
 
 
 def _delay(c: Chain) -> None:
@@ -49,10 +50,12 @@ def _backlash(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:  # 
 def _stall(c: Chain) -> None:
     beyond = ca.fmax(0, ca.fabs(c.plane) - c.p["stall_angle"])
     c.plane = c.plane - c.p["stall_loss"] * beyond * ca.sign(c.plane)
+    c.change = ca.if_else(beyond > 0, c.change * (1 - c.p["stall_loss"]), c.change)
 
 
 def _effectiveness(c: Chain) -> None:
-    c.plane = c.plane * (1 + c.p["effectiveness_step"] * after(c.time, c.p["effectiveness_time"]))
+    share = 1 + c.p["effectiveness_step"] * after(c.time, c.p["effectiveness_time"])
+    c.plane, c.change = c.plane * share, c.change * share
 
 
 def _at_command(c: Chain) -> ca.SX:

@@ -32,5 +32,4 @@ def one_step_without(fit: Fit, effect: Effect) -> tuple[float, Array] | None:
     parameters = fit.parameters.copy()
     parameters[gone] = 0.0
     parameters[others] += follow
-    bounds = fit.structure.parameters
-    return float(loss), np.clip(parameters, [p.lower for p in bounds], [p.upper for p in bounds])
+    return float(loss), fit.structure.clipped(parameters)

@@ -23,7 +23,7 @@ from host.output_error import annealed, free_run_cost, output_error
 from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
 from host.recording import Array, Recording
 from host.rounding import thinned
-from host.valleys import log_prior, other_valleys, with_rivals
+from host.valleys import log_prior, other_valleys, plausibility, with_rivals
 from host.wave_forces import wave_forces, wave_forces_from
 
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
@@ -85,7 +85,7 @@ class Fitter:
             Point(structure, np.concatenate([values, offsets]), fit.initial, fit.noise),
             Point(structure, np.concatenate([base.parameters, np.zeros(2)]), base.initial, base.noise),
         ]
-        best = max(map(self._carried_on, starts), key=lambda fit: fit.log_likelihood)
+        best = max(map(self._carried_on, starts), key=plausibility)
         return self._explained(names, best)
 
     def retrimmed(self, explanation: Explanation, offsets: Names) -> Explanation:
@@ -165,7 +165,7 @@ class Fitter:
         """A start at which the effect that joins does not act yet, as near as its bounds allow."""
         point, effect = self.point(names, parent, name, probe), named(name)
         values = np.where(np.isin(point.structure.names, effect.size_names), 0.0, point.parameters)
-        return replace(point, parameters=np.maximum(values, [p.lower for p in point.structure.parameters]))
+        return replace(point, parameters=point.structure.clipped(values))
 
     def gain(self, parent: Explanation, name: str, values: list[Array], is_thorough: bool) -> float:
         """See host.diagnosis.prospects, as for `form_gains`: here for the workers to call."""

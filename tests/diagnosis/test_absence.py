@@ -49,12 +49,14 @@ def test_no_angle_of_its_stops_frees_a_plane(fitted: tuple[Fitter, Explanation])
     assert one_step_without(stopped.fit, named("actuator_saturation")) is None
 
 
-def test_a_set_does_no_worse_than_with_a_member_less(fitted: tuple[Fitter, Explanation]) -> None:
+def test_a_set_does_no_worse_than_with_a_member_less(
+    fitted: tuple[Fitter, Explanation], monkeypatch: pytest.MonkeyPatch
+) -> None:
     fitter, both = fitted
-    far = [np.array([-49.0])]  # a start from which the search runs into another valley, or away
-    more = fitter.grown(
-        fitter.grown(fitter.base, "heave_pitch_rate_coupling", []), "heave_quadratic_drag", far
-    )
+    less = fitter.grown(fitter.base, "heave_pitch_rate_coupling", [])
+    # A drag that drives instead of braking: from there the search runs away.
+    monkeypatch.setattr("host.diagnosis.fitter.probed", lambda *_: [(0.0, np.array([1000.0]))])
+    more = fitter.polished(fitter.grown(less, "heave_quadratic_drag", []))
     assert more.fit.log_likelihood > both.fit.log_likelihood - 2.0
 
 

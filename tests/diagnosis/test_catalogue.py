@@ -68,6 +68,16 @@ def test_a_delay_is_that_of_the_command_however_coarse_the_rows(delay: float) ->
     assert np.abs(run.outputs - true).max() < 1e-3 * np.ptp(true, axis=1).min()
 
 
+def test_the_zero_error_of_a_plane_is_delayed_with_its_command() -> None:
+    rows = hidden_dive(duration=30.0)
+    both = inputs_of(rows, structure_of(("rudder_offset", "actuator_delay")))
+    values = dict.fromkeys(both.structure.names, 0.0) | BASE | {"rudder_zero": 0.02, "delay": 0.25}
+    run = free_run(np.array([values[name] for name in both.structure.names]), START, both)
+    shifted = inputs_of(replace(rows, rudder=rows.rudder + 0.02), structure_of(("actuator_delay",)))
+    true = free_run(np.array([*BASE.values(), 0.0, 0.0, 0.25]), START, shifted)
+    np.testing.assert_allclose(run.outputs, true.outputs, atol=1e-9)
+
+
 def test_a_low_centre_of_gravity_feels_a_change_of_speed() -> None:
     # With the planes level and no heave only the surge acceleration turns the vehicle: theta = -u'/g.
     still = hidden_dive(duration=30.0)

@@ -8,7 +8,7 @@ from exact_dive import TABLE_1, Dive, fly
 
 from host.equations import BASE, NAMES
 from host.gauss_newton import Point
-from host.identifiability import open_combinations, undetermined
+from host.identifiability import ambiguity, open_combinations, undetermined
 from host.identify import identify
 from host.maximum_likelihood import fit_maximum_likelihood
 from host.output_error import output_error
@@ -86,3 +86,12 @@ def test_two_valleys_are_told() -> None:
     more = fit_maximum_likelihood([fly(replace(dive, amplitude=0.25, duration=120.0))[0]])
     assert more.rivals == ()
     assert abs(more.parameters[5] / TABLE_1["u0"] - 1.0) < 0.3
+
+
+def test_answers_that_differ_little_are_told_by_what_differs_most() -> None:
+    known = np.array([*TABLE_1.values(), 0.0, 0.0])
+    near = known * np.array([1.02, 1.0, 1.0, 1.05, 1.0, 1.01, 1.0, 1.0])
+    sentence = ambiguity(known, near)
+    assert f"b1 = {near[3]:.4g} instead of {known[3]:.4g}." in sentence
+    assert "u0 =" not in sentence
+    assert "differ in the effects alone" in ambiguity(known, known.copy())
