@@ -30,6 +30,8 @@ class Fit:
     wander       variance and correlation time s of the part of each sensor's error, pitch and depth, that
                  wanders (2, 2); zero where all of it is white
     waves        frequency rad/s and damping ratio of the random forces, (2,); zero where they are white
+    deviance     -2 log-likelihood at these noise levels, but for what depends on them alone: the sum of the
+                 squared innovations, unless readings are rounded
     rivals       other maxima that are almost as likely
     whitened     innovations over their deviation, (2, N) each, NaN where nothing was measured
     scores       whitened sensitivities of the free parameters, (2, free, N) each, what the initial states
@@ -45,6 +47,7 @@ class Fit:
     whitened: list[Array]
     scores: list[Array]
     log_likelihood: float
+    deviance: float
     iterations: int
     converged: bool
     wander: Array = field(default_factory=lambda: np.zeros((2, 2)))
@@ -99,6 +102,7 @@ def finished(
     likelihood: float,
     iterations: int,
     converged: bool,
+    deviance: float | None = None,
 ) -> Fit:
     """The fit at a point, from its whitened innovations and sensitivities."""
     normal = GaussNewton(white, point, free)
@@ -114,6 +118,7 @@ def finished(
         whitened=[np.where(i.present > 0.0, e, np.nan) for (e, _), i in zip(white, inputs, strict=True)],
         scores=normal.scores(white),
         log_likelihood=likelihood,
+        deviance=sum(float(np.sum(e**2)) for e, _ in white) if deviance is None else deviance,
         iterations=iterations,
         converged=converged,
     )

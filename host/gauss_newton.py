@@ -61,7 +61,7 @@ class GaussNewton:
             self.own.append((H[:count, count:], Hxx, g[count:]))
 
     def predicted_cost(self, cost: float) -> float:
-        """Sum of squares after the full step if the equations were linear."""
+        """Deviance, of `cost` here, after the full step if the equations were linear."""
         count = self.g.size
         reduced, rhs, left = self.information(), self.g.copy(), cost
         for Hpx, Hxx, gx in self.own:

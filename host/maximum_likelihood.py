@@ -17,9 +17,11 @@ from host.equations import BASE, Structure
 from host.filter_error import filter_error
 from host.fit import Fit
 from host.gauss_newton import Point
+from host.noise_floor import resolution
 from host.output_error import SMALLEST_NOISE, output_error
 from host.propagate import Inputs, inputs_of
 from host.recording import Array, Recording
+from host.rounding import thinned
 from host.start_values import start_values
 from host.valleys import are_apart, other_valleys, plausibility, with_rivals
 from host.wave_forces import wave_forces
@@ -54,7 +56,8 @@ def fit_maximum_likelihood(
     if recordings[0].has_speed:
         held["u0"] = float(np.mean([r.speed.mean() for r in recordings]))
     free = np.array([name not in held for name in structure.names])
-    inputs = [inputs_of(recording, structure) for recording in recordings]
+    steps = resolution(recordings)
+    inputs = [inputs_of(recording, structure, steps=steps) for recording in recordings]
     if starts is None:
         own = [value for effect in structure.effects for value in effect.probes[0]]
         starts = [(np.concatenate([base, own]), initial) for base, initial in start_values(recordings)]
@@ -74,14 +77,20 @@ def fit_maximum_likelihood(
     if noise_model == "output_error" or (noise_model == "auto" and nothing_left):
         return with_rivals(best, others)
     on_progress("random forces, wandering sensors, waves")
+    plain, inputs = best, [inputs_of(recording, structure) for recording in thinned(recordings)]
+    if steps.any():  # a filter takes errors for normal: it is compared with a free run that does, too
+        start = Point(structure, best.parameters, best.initial, best.noise)
+        plain = output_error(start, inputs, free)
     if noise_model == "filter_error":
-        chosen = filter_error(best, inputs)
+        chosen = filter_error(plain, inputs)
     else:
-        chosen = best
-        for fit in _noise_models(best, inputs):
+        chosen = plain
+        for fit in _noise_models(plain, inputs):
             chosen = min(chosen, fit, key=lambda fit: fit.bic)
             if chosen is fit and all(is_white(e) for e in fit.whitened):
                 break
+    if chosen is plain:
+        return with_rivals(best, others)
     near = [fit for fit in others if fit.log_likelihood > best.log_likelihood - NEAR * best.samples]
     return with_rivals(chosen, [_like(chosen, fit, inputs) for fit in near if are_apart(fit, best)])
 

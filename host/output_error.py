@@ -1,7 +1,8 @@
 """Maximum likelihood where the sensors' white noise is all that is random: the model runs freely.
 
 With residuals e of the free run, and the noise variances R of pitch and depth at their likeliest values,
--log L = 1/2 sum over the channels of count (log R + 1).
+-log L = 1/2 sum over the channels of count (log R + 1). A channel whose rounding rules its noise has the
+likelihood of intervals (host.interval_likelihood); R is then the noise before rounding and step^2 / 12.
 """
 
 import numpy as np
@@ -9,12 +10,19 @@ import numpy as np
 from host.filter_error import whitened_innovations
 from host.fit import Fit, finished, run_away
 from host.gauss_newton import GaussNewton, Mask, Point, whiten
+from host.interval_likelihood import (
+    LEAST_DEVIATION,
+    likeliest_deviation,
+    log_probability,
+    score_and_information,
+)
 from host.propagate import Inputs, free_run, innovations
 from host.recording import Array
 
 # rad^2, m^2: below any sensor, so that noise-free data divide by no zero
 SMALLEST_NOISE = np.array([1e-12, 1e-10])
 RUNAWAY = 1e7  # of a sensitivity, in SI: the model leaves the recording exponentially
+LOST = 1e12  # rad^2, m^2: a run that leaves the recording needs no likelihood of its rounding
 ANNEALING = (0.1, 0.01, 1e-3, 1e-4)  # s, variance of the unknown force over that of all force
 
 
@@ -24,17 +32,15 @@ def output_error(
     """Gauss-Newton on the free run, the noise variances concentrated out; ends at a gain below tolerance."""
     point, damping, converged, iterations = start, 1e-3, False, 0
     parts = _innovations(point, inputs)
-    noise = _residual_noise([error for error, _ in parts], inputs)
-    cost = _concentrated_cost(noise, inputs)
+    noise, cost = _likeliest_noise([error for error, _ in parts], inputs)
     if not np.isfinite(cost) or not all(np.abs(S).max() < RUNAWAY for _, S in parts):
         return run_away(point, inputs, free)
     while not converged and iterations < most_iterations:
         iterations += 1
-        step = GaussNewton(_whitened_by(noise, parts), point, free)
+        step = GaussNewton(_whitened_by(noise, parts, inputs), point, free)
         while True:
             trial = step.trial(damping)
-            trial_noise = _residual_noise(_free_run_errors(trial, inputs), inputs)
-            trial_cost = _concentrated_cost(trial_noise, inputs)
+            trial_noise, trial_cost = _likeliest_noise(_free_run_errors(trial, inputs), inputs)
             if trial_cost < cost or damping > 1e8:
                 break
             damping = max(damping * 8.0, 1e-6)
@@ -46,7 +52,9 @@ def output_error(
         parts = _innovations(point, inputs)
         damping = damping / 10.0
     point = point.with_noise(np.concatenate([noise, [0.0, 0.0]]))
-    return finished(point, _whitened_by(noise, parts), inputs, free, -cost, iterations, converged)
+    white = _whitened_by(noise, parts, inputs)
+    deviance = _deviance(noise, parts, white, inputs)
+    return finished(point, white, inputs, free, -cost, iterations, converged, deviance)
 
 
 def annealed(start: Point, inputs: list[Inputs], free: Mask, accelerations: tuple[float, float]) -> Point:
@@ -72,22 +80,55 @@ def annealed(start: Point, inputs: list[Inputs], free: Mask, accelerations: tupl
 
 def free_run_cost(point: Point, inputs: list[Inputs]) -> float:
     """-log L of the free run at a point, but for a constant; inf where it runs away."""
-    cost = _concentrated_cost(_residual_noise(_free_run_errors(point, inputs), inputs), inputs)
+    _, cost = _likeliest_noise(_free_run_errors(point, inputs), inputs)
     return cost if np.isfinite(cost) else np.inf
 
 
-def residuals_at(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:
-    """Free-run residuals whitened by the point's sensor noise, and their sensitivities."""
-    return _whitened_by(point.noise, _innovations(point, inputs))
+def residuals_at(point: Point, inputs: list[Inputs]) -> tuple[list[tuple[Array, Array]], float]:
+    """Free-run residuals whitened by the point's sensor noise, their sensitivities, and the deviance."""
+    parts = _innovations(point, inputs)
+    white = _whitened_by(point.noise, parts, inputs)
+    return white, _deviance(point.noise, parts, white, inputs)
 
 
 def _innovations(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:
     return [innovations(point.parameters, x0, one) for x0, one in zip(point.initial, inputs, strict=True)]
 
 
-def _whitened_by(noise: Array, parts: list[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
+def _whitened_by(
+    noise: Array, parts: list[tuple[Array, Array]], inputs: list[Inputs]
+) -> list[tuple[Array, Array]]:
+    """Residuals e and sensitivities S such that S^T e is the score and S^T S the information."""
     variance = np.array([[noise[0]], [0.0], [noise[1]]])
-    return [whiten(e, S, np.repeat(variance, e.shape[1], axis=1)) for e, S in parts]
+    white = [whiten(e, S, np.repeat(variance, e.shape[1], axis=1)) for e, S in parts]
+    steps = inputs[0].steps
+    for i in np.flatnonzero(steps):
+        deviation = _before_rounding(noise[i], steps[i])
+        for (error, sensitivity), (e, S), one in zip(parts, white, inputs, strict=True):
+            score, information = score_and_information(error[i], steps[i], deviation)
+            e[i] = one.present[i] * score / np.sqrt(information)
+            S[i] = sensitivity[i] * np.sqrt(information)
+    return white
+
+
+def _deviance(
+    noise: Array, parts: list[tuple[Array, Array]], white: list[tuple[Array, Array]], inputs: list[Inputs]
+) -> float:
+    steps, total = inputs[0].steps, 0.0
+    for (error, _), (e, _), one in zip(parts, white, inputs, strict=True):
+        for i in range(2):
+            if steps[i] == 0.0:
+                total += float(np.sum(e[i] ** 2))
+            else:
+                known = error[i, one.present[i] > 0.0]
+                deviation = _before_rounding(noise[i], steps[i])
+                total -= 2.0 * float(log_probability(known, steps[i], deviation).sum())
+    return total
+
+
+def _before_rounding(variance: float, step: float) -> float:
+    """Deviation of the noise that was rounded."""
+    return float(np.sqrt(max(variance - step**2 / 12.0, (LEAST_DEVIATION * step) ** 2)))
 
 
 def _free_run_errors(point: Point, inputs: list[Inputs]) -> list[Array]:
@@ -98,14 +139,16 @@ def _free_run_errors(point: Point, inputs: list[Inputs]) -> list[Array]:
         ]
 
 
-def _residual_noise(errors: list[Array], inputs: list[Inputs]) -> Array:
+def _likeliest_noise(errors: list[Array], inputs: list[Inputs]) -> tuple[Array, float]:
+    """Variances (2,) of pitch and depth under which the errors are likeliest, and -log L there."""
     count = sum(one.present.sum(axis=1) for one in inputs)
     with np.errstate(over="ignore", invalid="ignore"):
         squares = np.sum([np.sum(error**2, axis=1) for error in errors], axis=0)
-        variance: Array = np.maximum(np.nan_to_num(squares / count, nan=np.inf), SMALLEST_NOISE)
-    return variance
-
-
-def _concentrated_cost(noise: Array, inputs: list[Inputs]) -> float:
-    count = sum(one.present.sum(axis=1) for one in inputs)
-    return 0.5 * float(np.sum(count * (np.log(noise) + 1.0)))
+        variance = np.maximum(np.nan_to_num(squares / count, nan=np.inf), SMALLEST_NOISE)
+    costs = 0.5 * count * (np.log(variance) + 1.0)
+    steps = inputs[0].steps
+    for i in np.flatnonzero(steps * (variance < LOST)):
+        known = [error[i, one.present[i] > 0.0] for error, one in zip(errors, inputs, strict=True)]
+        deviation, costs[i] = likeliest_deviation(np.concatenate(known), steps[i])
+        variance[i] = deviation**2 + steps[i] ** 2 / 12.0
+    return variance, float(np.sum(costs))

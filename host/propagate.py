@@ -6,7 +6,7 @@ resolution; derivatives are those of the very same steps, by CasADi, so gradient
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
@@ -33,6 +33,7 @@ class Inputs:
               commands, newest first
     measured  (2, N) pitch rad and depth m, 0 where missing
     present   (2, N) 1 where measured, else 0
+    steps     (2,) of the rounding of pitch and depth where it rules, else 0
     """
 
     structure: Structure
@@ -40,10 +41,14 @@ class Inputs:
     measured: Array
     present: Array
     substeps: int
+    steps: Array = field(default_factory=lambda: np.zeros(2))
 
 
 def inputs_of(
-    recording: Recording, structure: Structure = BASE, longest_substep: float = LONGEST_SUBSTEP
+    recording: Recording,
+    structure: Structure = BASE,
+    longest_substep: float = LONGEST_SUBSTEP,
+    steps: Array | None = None,
 ) -> Inputs:
     """Inputs of one recording. Longer sub-steps (s) suit vehicles whose modes are known to be slow."""
     intervals = recording.intervals
@@ -65,6 +70,7 @@ def inputs_of(
         measured=np.where(present, measured, 0.0),
         present=present.astype(float),
         substeps=int(np.ceil(recording.step / max(longest_substep, recording.step / MOST_SUBSTEPS) - 1e-6)),
+        steps=np.zeros(2) if steps is None else steps,
     )
 
 

@@ -6,22 +6,30 @@ import numpy as np
 
 from host.recording import Array, Recording
 
+OFF_LATTICE = 0.01  # of a step, to which readings are written
+
 
 def quantum(pieces: list[Array]) -> float:
-    """The step of a quantised channel; 0 where hardly any value repeats."""
+    """The step of a quantised channel, that of its readings' lattice; 0 where they lie on none.
+
+    Readings resampled between the steps lie on none, but repeat: there it is the usual distance of two.
+    """
     values = np.concatenate([piece[np.isfinite(piece)] for piece in pieces])
     levels = np.unique(np.round(values, 9))
-    if levels.size < 2 or levels.size > values.size / 3:
+    if levels.size < 2:
         return 0.0
-    return float(np.median(np.diff(levels)))
+    steps = np.diff(levels)
+    if np.allclose(steps / steps.min(), np.round(steps / steps.min()), atol=OFF_LATTICE):
+        return float(steps.min())
+    return float(np.median(steps)) if levels.size <= values.size / 3 else 0.0
 
 
 def thinned(recordings: list[Recording]) -> list[Recording]:
     """The recordings with as many values of a quantised channel as its level changes tell.
 
-    While a value stays the same its rounding error is one error, not as many as there are rows, nor two: a
-    fit that takes them for independent finds physics in the steps of the rounding. A channel whose noise
-    makes it change level all the time, or that has no steps, stays whole.
+    For estimators that take errors for normal and independent. While a value stays the same its rounding
+    error is one error, not as many as there are rows, nor two. A channel whose noise makes it change level
+    all the time, or that has no steps, stays whole.
     """
     depth = _thinned([r.depth for r in recordings])
     pitch = _thinned([r.pitch for r in recordings])

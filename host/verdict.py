@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.diagnosis.noise_floor import noise_floor
 from host.identify import Identification
+from host.noise_floor import noise_floor
 from host.predict import Prediction
 from host.recording import Array
 

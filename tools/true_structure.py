@@ -42,10 +42,10 @@ def heldout_errors(path: Path, names: tuple[str, ...], start: dict[str, float]) 
     from host.catalogue.kin import OFFSETS
     from host.diagnosis.explanation import Explanation
     from host.diagnosis.fitter import Fitter
-    from host.diagnosis.noise_floor import noise_floor
     from host.diagnosis.scoring import misfit
     from host.diagnosis.spans import divide
     from host.gauss_newton import Point
+    from host.noise_floor import noise_floor
     from host.output_error import output_error
 
     spans = divide(recordings)

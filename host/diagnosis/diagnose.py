@@ -13,7 +13,6 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import SEA_DOUBT, Leftover, leftover
 from host.diagnosis.locate import Location, locate
-from host.diagnosis.noise_floor import noise_floor
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.search import Search
 from host.diagnosis.seas import WAVES, Waves, among_waves, in_a_sea
@@ -23,6 +22,7 @@ from host.diagnosis.unknown_physics import known_in, unknown_in, with_unknown
 from host.diagnosis.workers import Workers
 from host.equations import NAMES, Slot
 from host.identifiability import ambiguity
+from host.noise_floor import noise_floor
 from host.outliers import without_outliers
 from host.recording import Array, Recording
 from host.uncertainty import covariance

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from host.fit import Fit
 
 Names = frozenset[str]
@@ -20,8 +18,3 @@ class Explanation:
     def lean(self) -> "Explanation":
         """Without the sensitivities of every row: those of a whole search fill the memory."""
         return replace(self, fit=replace(self.fit, scores=[]))
-
-    @property
-    def squares(self) -> float:
-        """Sum of the squared whitened innovations."""
-        return sum(float(np.nansum(e**2)) for e in self.fit.whitened)

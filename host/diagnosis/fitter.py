@@ -12,13 +12,13 @@ from host.catalogue.unknown import SPANS
 from host.diagnosis.absence import one_step_without
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations, first_guess
-from host.diagnosis.noise_floor import noise_floor
 from host.diagnosis.prospects import form_gains, gain, probed
 from host.equations import NAMES
 from host.filter_error import filter_error, filter_error_from
 from host.fit import Fit
 from host.gauss_newton import Mask, Point
 from host.maximum_likelihood import fit_maximum_likelihood
+from host.noise_floor import noise_floor, resolution
 from host.output_error import annealed, free_run_cost, output_error
 from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
 from host.recording import Array, Recording
@@ -32,22 +32,26 @@ COMPRESSED = "depth_dependent_buoyancy"
 FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
 # Enough to rank sets; those that count are polished.
 FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 12, 0.2
+EXACT, SETTLED = 1e-3, 0.005  # of a log-likelihood, that an iteration of a polished fit may still gain
+INSTANT, USUAL_DAMPING = -10.0, -1.0  # 1/s, of a1: a base that lacks an effect may follow its plane at once
 NOT_THERE = 1.2  # times the sensor noise that the set left elsewhere: it has ended in another valley
 ROUGHLY = 1.0  # of a log-likelihood: a set does at least as well as with one member less
+
+A1, B1 = NAMES.index("a1"), NAMES.index("b1")
 
 
 class Fitter:
     """All that the fits of one diagnosis share: recordings, noise floor, what is held, where fits start.
 
-    measured  the recordings as they are; `recordings` with no more of a quantised channel than it tells
     known  an explanation of other stretches of the same vehicle; without one the base model is fitted
     """
 
     def __init__(self, recordings: list[Recording], known: Explanation | None = None) -> None:
         self.floor = noise_floor(recordings)
-        self.measured = recordings
-        self.recordings = recordings = thinned(recordings)
-        self.accelerations = accelerations(recordings)
+        self.recordings = recordings
+        self._thinned = thinned(recordings)
+        self._steps = resolution(recordings)
+        self.accelerations = accelerations(self._thinned)
         self.held = dict(HELD)
         if recordings[0].has_speed:
             self.held["u0"] = float(np.mean([r.speed.mean() for r in recordings]))
@@ -55,7 +59,7 @@ class Fitter:
             self.held |= {name: 0.0 for name in ("c_ud", "c_uq")} | {"speed_time": 1.0}
         self.held |= dict.fromkeys(SPANS.values(), max(float(r.time[-1]) for r in recordings))
         self._longest_substep = LONGEST_SUBSTEP
-        self._inputs: dict[Names, list[Inputs]] = {}
+        self._inputs: dict[tuple[Names, bool], list[Inputs]] = {}
         self.base = self._base() if known is None else known
         parameters = self.base.fit.parameters
         self._longest_substep = longest_substep(parameters)
@@ -109,15 +113,28 @@ class Fitter:
 
     def with_sea(self, explanation: Explanation) -> Explanation:
         """The same set when random forces act as well; whatever grows from it is fitted with them, too."""
-        fit = filter_error(explanation.fit, self.inputs(explanation.names))
+        fit = filter_error(explanation.fit, self.inputs(explanation.names, for_filter=True))
         return self._explained(explanation.names, fit)
+
+    def as_filtered(self, explanation: Explanation) -> Explanation:
+        """The same set with the errors of rounded readings taken for normal, as a filter does.
+
+        Only then its likelihood compares with that of a set among random forces.
+        """
+        fit = explanation.fit
+        if fit.has_process_noise or not self._steps.any():
+            return explanation
+        start = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+        inputs = self.inputs(explanation.names, for_filter=True)
+        return self._explained(explanation.names, output_error(start, inputs, fit.free))
 
     def with_waves(self, explanation: Explanation, waves: Fit | None = None) -> Explanation:
         """The same set among waves: the likeliest ones, or those of another fit, held.
 
         Whatever grows from it is fitted in these waves.
         """
-        free, inputs, fit = self.free(explanation.names), self.inputs(explanation.names), explanation.fit
+        free, fit = self.free(explanation.names), explanation.fit
+        inputs = self.inputs(explanation.names, for_filter=True)
         if waves is None and not fit.waves.any():
             return self._explained(explanation.names, wave_forces(fit, inputs))
         start = Point(fit.structure, fit.parameters, fit.initial, (fit if waves is None else waves).levels)
@@ -151,6 +168,8 @@ class Fitter:
         starts = [self.point(names, parent, name, probe) for _, probe in likely[:2]]
         if self.excess(parent.fit) > FAR:
             starts = [starts[0], self._guess(starts[0], names)]
+        if parent.fit.parameters[A1] < INSTANT:
+            starts += [_slower(start) for start in starts]
         if rival is not None:
             starts += [self.point(names, rival, name, probe) for _, probe in likely[:2]]
             starts += [
@@ -188,11 +207,11 @@ class Fitter:
             starts.append(self._guess(start, names))
         return self._explained(names, self._fit(starts))
 
-    def polished(self, explanation: Explanation) -> Explanation:
-        """The same set, its fit carried on until nothing more is gained."""
+    def polished(self, explanation: Explanation, tolerance: float = SETTLED) -> Explanation:
+        """The same set, its fit carried on until next to nothing more is gained."""
         fit = explanation.fit
         start = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
-        return self._explained(explanation.names, self._carried_on(start))
+        return self._explained(explanation.names, self._carried_on(start, tolerance))
 
     def across(self, explanation: Explanation) -> Explanation:
         """The same set in the likeliest valley of all, with the others that this recording cannot rule out.
@@ -218,9 +237,10 @@ class Fitter:
         start = Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0]))
         fit = self._fit([start])
         if self.excess(fit) > NOT_THERE * self.excess(explanation.fit):
-            moved = annealed(start, self.inputs(explanation.names), fit.free, self.accelerations)
+            inputs = self.inputs(explanation.names, for_filter=True)
+            moved = annealed(start, inputs, fit.free, self.accelerations)
             fit = self._fit([start, moved])
-        return self.polished(self._explained(explanation.names, fit))
+        return self.polished(self._explained(explanation.names, fit), EXACT)
 
     def free(self, names: Names) -> Mask:
         """Which parameters of a set are estimated."""
@@ -252,26 +272,31 @@ class Fitter:
         shortest = max(limits[0], 2.0 * longest.step)
         return max(1.0, longest.duration * (1.0 / shortest - 1.0 / limits[1]))
 
-    def inputs(self, names: Names) -> list[Inputs]:
-        """What drives the set's equations over each recording."""
-        if names not in self._inputs:
-            structure = structure_of(names)
-            self._inputs[names] = [
-                inputs_of(recording, structure, self._longest_substep) for recording in self.recordings
+    def inputs(self, names: Names, for_filter: bool = False) -> list[Inputs]:
+        """What drives the set's equations over each recording.
+
+        A filter takes errors for normal: of rounded readings it gets no more than they tell.
+        """
+        if (names, for_filter) not in self._inputs:
+            structure, steps = structure_of(names), None if for_filter else self._steps
+            self._inputs[names, for_filter] = [
+                inputs_of(recording, structure, self._longest_substep, steps)
+                for recording in (self._thinned if for_filter else self.recordings)
             ]
-        return self._inputs[names]
+        return self._inputs[names, for_filter]
 
     def _explained(self, names: Names, fit: Fit) -> Explanation:
         return Explanation(names, fit, self.bic(fit, names))
 
     def _guess(self, start: Point, names: Names) -> Point:
         """The rough values of regression where it gives some, `start` elsewhere, moved into their valley."""
-        rough = first_guess(self.recordings, self._speed, names)
+        rough = first_guess(self._thinned, self._speed, names)
         rough = {name: value for name, value in rough.items() if name not in self.held}
         own = zip(start.structure.names, start.parameters, strict=True)
         values = np.array([rough.get(name, value) for name, value in own])
         point = Point(start.structure, values, start.initial, np.array([*self.floor, 0.0, 0.0]))
-        return annealed(point, self.inputs(names), self.free(names), self.accelerations)
+        inputs = self.inputs(names, for_filter=True)
+        return annealed(point, inputs, self.free(names), self.accelerations)
 
     def point(
         self, names: Names, parent: Explanation, added: str | None = None, probe: Array | None = None
@@ -310,14 +335,22 @@ class Fitter:
         scales = [self.scales[scale] for scale in (effect.scales or ("",) * len(effect.parameters))]
         return [np.array([value, *(np.array(effect.probes[0]) * scales)[1:]])]
 
-    def _carried_on(self, start: Point) -> Fit:
+    def _carried_on(self, start: Point, tolerance: float = SETTLED) -> Fit:
         names = frozenset(effect.name for effect in start.structure.effects)
-        inputs, free = self.inputs(names), self.free(names)
+        free, has_forces = self.free(names), bool(start.noise[2:].any())
+        inputs = self.inputs(names, for_filter=has_forces)
         if start.noise.size > 4:
             return wave_forces_from(start, inputs, free, holds_noise=True)
-        if start.noise[2:].any():
+        if has_forces:
             return filter_error_from(start, inputs, free)
-        return output_error(start, inputs, free)
+        return output_error(start, inputs, free, tolerance=tolerance)
+
+
+def _slower(start: Point) -> Point:
+    """A start with the heave damping of a usual vehicle and the same steady heave velocity."""
+    parameters = start.parameters.copy()
+    parameters[[A1, B1]] *= USUAL_DAMPING / parameters[A1]
+    return replace(start, parameters=parameters)
 
 
 def _first(values: Array) -> float:

@@ -11,9 +11,9 @@ from scipy.stats import chi2
 from host.catalogue.unknown import ANY_SMOOTH_FORCE
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.noise_floor import is_quantised
 from host.equations import NAMES
 from host.fit import Fit
+from host.noise_floor import resolution
 from host.recording import Array, Recording
 from host.whiteness import correlation_factor, is_white
 
@@ -55,18 +55,22 @@ class Leftover:
 
 
 def leftover(fitter: Fitter, best: Explanation) -> Leftover:
-    """Tests the innovations of an explanation, but for quantised channels: rounding is no white noise."""
+    """Tests the innovations of an explanation.
+
+    What rounding leaves is white only under the likelihood of intervals, which no filter has, and its size
+    tells of the motion.
+    """
     fit = best.fit
-    rounded = is_quantised(fitter.measured)
-    tested = ~rounded
+    rounded = resolution(fitter.recordings) > 0.0
     counts = np.sum([np.isfinite(e).sum(axis=1) for e in fit.whitened], axis=0)
     doubt = np.where(rounded, ROUNDING_DOUBT, np.maximum(FLOOR_DOUBT, 1.0 + FLOOR_SPREAD / np.sqrt(counts)))
-    innovations = [e[tested] for e in fit.whitened]
+    even = [e[~rounded] for e in fit.whitened]
+    innovations = even if fit.has_process_noise else fit.whitened
     gain = fitter.gain(best, ANY_SMOOTH_FORCE.name, [], is_thorough=True) / correlation_factor(fit.whitened)
     terms = len(ANY_SMOOTH_FORCE.parameters)
     return Leftover(
         is_coloured=not all(is_white(e, significance=SIGNIFICANCE) and _is_even(e) for e in innovations),
-        is_local=_is_local(fitter.recordings, innovations),
+        is_local=_is_local(fitter.recordings, even),
         is_no_sea=fit.has_process_noise and not fit.waves.any() and _heave_by_sea(fit) < LEAST_SEA,
         is_above_floor=bool((fit.noise[:2] > doubt * fitter.floor).any()),
         smooth_gain=gain,

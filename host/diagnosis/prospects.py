@@ -37,12 +37,12 @@ def form_gains(fitter: "Fitter", parent: Explanation) -> dict[str, float]:
     Those of the motion share the sensitivities of one propagation with all of them at zero.
     """
     names = parent.names | {ANY_SMOOTH_FORCE.name}
-    structure, inputs = structure_of(names), fitter.inputs(names)
+    structure, inputs = structure_of(names), fitter.inputs(names, parent.fit.has_process_noise)
     point = fitter.point(names, parent, ANY_SMOOTH_FORCE.name, np.zeros(len(ANY_SMOOTH_FORCE.parameters)))
     white, cost = _whitened(point, inputs, parent)
     own = {parameter.name for parameter in ANY_SMOOTH_FORCE.parameters}
     free = fitter.free(names) & np.array([name not in own for name in structure.names])
-    before, charge = parent.squares, log(parent.fit.samples)
+    before, charge = parent.fit.deviance, log(parent.fit.samples)
     gains = {}
     for form in FORMS:
         if form.name in parent.names:
@@ -62,8 +62,8 @@ def probed(
 ) -> list[tuple[float, Array]]:
     """Predicted gain and start values of an effect, for each of its probes."""
     names = parent.names | {effect.name}
-    inputs, free = fitter.inputs(names), fitter.free(names)
-    before = parent.squares
+    inputs, free = fitter.inputs(names, parent.fit.has_process_noise), fitter.free(names)
+    before = parent.fit.deviance
     found = []
     for probe in [*values, *(_probes(fitter, effect, parent) if is_thorough else [])]:
         point = fitter.point(names, parent, effect.name, probe)
@@ -76,16 +76,20 @@ def probed(
 def _whitened(
     point: Point, inputs: list[Inputs], parent: Explanation
 ) -> tuple[list[tuple[Array, Array]], float]:
-    """Innovations and sensitivities under the parent's noise, and their sum of squares: inf if lost."""
+    """Innovations and sensitivities under the parent's noise, and the deviance: inf if lost."""
     with np.errstate(over="ignore", invalid="ignore"):
         if parent.fit.waves.any():
             white = whitened_among_waves(point, inputs)
         elif parent.fit.has_process_noise:
             white = whitened_innovations(point, inputs)
         else:
-            white = residuals_at(point, inputs)
-        runs_away = not all(np.abs(S).max() < RUNAWAY for _, S in white)
-        return white, np.inf if runs_away else sum(float(np.sum(e**2)) for e, _ in white)
+            white, deviance = residuals_at(point, inputs)
+            return white, np.inf if _runs_away(white) else deviance
+        return white, np.inf if _runs_away(white) else sum(float(np.sum(e**2)) for e, _ in white)
+
+
+def _runs_away(white: list[tuple[Array, Array]]) -> bool:
+    return not all(np.abs(S).max() < RUNAWAY for _, S in white)
 
 
 def _probes(fitter: "Fitter", effect: Effect, parent: Explanation) -> list[Array]:

@@ -35,11 +35,12 @@ def in_a_sea(calm: Search, best: Explanation) -> tuple[Search, Explanation]:
     fitter = calm.fitter
     calm.on_progress("random forces")
     root, also = fitter.with_sea(calm.root), fitter.with_sea(best)
-    if min(root.bic, also.bic) > best.bic - NAMING_MARGIN:
+    least = fitter.as_filtered(best).bic
+    if min(root.bic, also.bic) > least - NAMING_MARGIN:
         return calm, best
     rough = Search(fitter, calm.workers, calm.on_progress, fitter.with_sea(calm.base), root, calm.part)
     found = rough.run([also])
-    return (rough, found) if found.bic < best.bic else (calm, best)
+    return (rough, found) if found.bic < least else (calm, best)
 
 
 def among_waves(rough: Search, best: Explanation) -> tuple[Search, Explanation, Waves | None]:
@@ -57,11 +58,12 @@ def among_waves(rough: Search, best: Explanation) -> tuple[Search, Explanation, 
     white = plain if plain.fit.has_process_noise else fitter.with_sea(plain)
     first = fitter.with_waves(white)
     period = 2.0 * np.pi / first.fit.waves[0]
-    if first.bic > best.bic - NAMING_MARGIN or not WAVE_PERIODS[0] < period < WAVE_PERIODS[1]:
+    least = fitter.as_filtered(best).bic
+    if first.bic > least - NAMING_MARGIN or not WAVE_PERIODS[0] < period < WAVE_PERIODS[1]:
         return rough, best, None
     base, root = (fitter.with_waves(one, first.fit) for one in (rough.base, rough.root))
     search = Search(fitter, rough.workers, rough.on_progress, base, root, rough.part)
     found = search.run([first])
     fitted = first if found.names == first.names else fitter.with_waves(found)
     model = fitter.with_regular_waves(fitted, white.fit)
-    return search, found, Waves(delta_bic=best.bic - first.bic, fitted=fitted, model=model)
+    return search, found, Waves(delta_bic=least - first.bic, fitted=fitted, model=model)

@@ -167,9 +167,11 @@ class _Flight:
     def _predict(self) -> None:
         free = self.rival.fit.free
         inputs = self._seen_by_rival()
-        whitened = whitened_innovations if self.named.fit.has_process_noise else residuals_at
         with np.errstate(over="ignore", invalid="ignore"):
-            white = whitened(self._point, [inputs])
+            if self.named.fit.has_process_noise:
+                white = whitened_innovations(self._point, [inputs])
+            else:
+                white, _ = residuals_at(self._point, [inputs])
             cost = sum(float(np.sum(e**2)) for e, _ in white)
             if not np.isfinite(cost) or not all(np.isfinite(S).all() for _, S in white):
                 return

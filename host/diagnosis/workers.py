@@ -24,7 +24,7 @@ class Workers:
         if jobs > 1:
             # Spawned, not forked: the progress display runs a thread, and forks do not survive threads.
             context = multiprocessing.get_context("spawn")
-            self._pool = ProcessPoolExecutor(jobs, context, _open, (fitter.measured, fitter.base))
+            self._pool = ProcessPoolExecutor(jobs, context, _open, (fitter.recordings, fitter.base))
 
     def __enter__(self) -> "Workers":
         return self

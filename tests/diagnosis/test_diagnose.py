@@ -9,8 +9,8 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.diagnosis.diagnose import Diagnosis, diagnose
-from host.diagnosis.noise_floor import noise_floor
 from host.diagnosis.spans import divide
+from host.noise_floor import noise_floor
 from tools.cli import main
 
 

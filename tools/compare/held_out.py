@@ -6,8 +6,8 @@ from time import perf_counter
 
 import numpy as np
 
-from host.diagnosis.noise_floor import noise_floor
 from host.errors import RecordingError
+from host.noise_floor import noise_floor
 from host.predict import SETTLING_SPAN
 from host.recording import Array, Recording
 from tools.compare.free_run import FreeRun

@@ -1,0 +1,54 @@
+"""The likelihood of readings that are rounded: each says in which interval the sensor's value lay, no more.
+
+With e = y - yhat, the step h of the rounding and white noise of deviation s before it,
+
+    P = Phi((e + h/2) / s) - Phi((e - h/2) / s)
+
+While a reading stays the same it says little, however often it is repeated; where it changes it says as much
+as the noise beneath lets it. A step that is small beside the noise leaves the normal density times h.
+Source: Gustafsson and Karlsson, Automatica 45(12), 2009.
+"""
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.special import log_ndtr
+
+from host.recording import Array
+
+LEAST_DEVIATION = 1.0 / 30.0  # of the step: no model is better than that within it
+LEAST_INFORMATION = 1e-12  # of that without rounding
+ACCURACY = 1e-4  # relative, of the deviation
+
+
+def log_probability(error: Array, step: float, deviation: float) -> Array:
+    """log P of readings with errors (N,)."""
+    upper, lower = (error + 0.5 * step) / deviation, (error - 0.5 * step) / deviation
+    # In the left tail, where the distribution function keeps its digits.
+    upper, lower = np.where(lower > 0.0, (-lower, -upper), (upper, lower))
+    first = log_ndtr(upper)
+    return np.asarray(first + np.log(-np.expm1(np.minimum(log_ndtr(lower) - first, -1e-300))))
+
+
+def likeliest_deviation(errors: Array, step: float) -> tuple[float, float]:
+    """The noise deviation under which errors (N,) are likeliest, and -log P of all of them there."""
+
+    def cost(log_deviation: float) -> float:
+        return -float(log_probability(errors, step, float(np.exp(log_deviation))).sum())
+
+    largest = float(np.sqrt(np.mean(errors**2))) + step
+    limits = np.log([LEAST_DEVIATION * step, 2.0 * largest])
+    found = minimize_scalar(cost, bounds=limits, method="bounded", options={"xatol": ACCURACY})
+    return float(np.exp(found.x)), float(found.fun)
+
+
+def score_and_information(error: Array, step: float, deviation: float) -> tuple[Array, Array]:
+    """First derivative of log P by the prediction yhat and minus its second, (N,) each.
+
+    The second is never negative: log P is concave.
+    """
+    upper, lower = (error + 0.5 * step) / deviation, (error - 0.5 * step) / deviation
+    log_p = log_probability(error, step, deviation) + 0.5 * np.log(2.0 * np.pi)
+    at_upper, at_lower = np.exp(-0.5 * upper**2 - log_p), np.exp(-0.5 * lower**2 - log_p)
+    score = (at_lower - at_upper) / deviation
+    information = score**2 + (upper * at_upper - lower * at_lower) / deviation**2
+    return score, np.clip(information, LEAST_INFORMATION / deviation**2, 1.0 / deviation**2)
