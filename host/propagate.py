@@ -117,13 +117,28 @@ class Form:
             k2 = slope(x + h / 2 * k1, time + h / 2, plane, p, drive)
             k3 = slope(x + h / 2 * k2, time + h / 2, plane, p, drive)
             k4 = slope(x + h * k3, time + h, plane + half, p, drive)
-            x = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            before, x = x, x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
             for name, value in moved.items():
                 x[states.index(name)] = value
+            for name, followed, lag in self.structure.followers:
+                i, own = states.index(followed), states.index(name)
+                time_constant = p[self.structure.names.index(lag)]
+                x[own] = _behind(before[own], before[i], x[i], (k4[i] - k1[i]) / (2 * h), time_constant, h)
         return x
 
     def outputs(self, x: ca.SX, p: ca.SX, drive: ca.SX) -> ca.SX:
         return self.structure.outputs(self.structure.chain(x, p, drive, drive[4]))
+
+
+def _behind(y: ca.SX, start: ca.SX, end: ca.SX, bend: ca.SX, lag: ca.SX, h: ca.SX) -> ca.SX:
+    """y after h where lag y' = u - y and u goes from start to end on a parabola with u'' / 2 = bend.
+
+    Exact, as a lag may be shorter than any sub-step: Runge-Kutta would take it for a far longer one.
+    """
+    slope = (end - start) / h - bend * h  # at the start
+    settled_then = start - lag * slope + 2 * lag**2 * bend
+    settled_now = end - lag * (slope + 2 * bend * h) + 2 * lag**2 * bend
+    return settled_now + (y - settled_then) * ca.exp(-h / lag)
 
 
 @cache

@@ -22,6 +22,7 @@ from host.propagate import Inputs
 from host.recording import Array
 
 SLOWEST = 0.2  # rad/s; slower is current
+QUICKEST = 4.0  # rad/s, where the search begins at most: in what white forces leave there may be no peak
 FIRST_DAMPING = 0.2
 
 
@@ -145,4 +146,5 @@ def _busiest(start: Fit, inputs: list[Inputs]) -> float:
     power = np.convolve(power, np.ones(9) / 9.0, mode="same")
     step = float(np.median(inputs[longest].drive[3]))
     frequencies = 2.0 * np.pi * np.fft.rfftfreq(innovations.size, step)
-    return float(frequencies[np.argmax(np.where(frequencies > 2.0 * SLOWEST, power, 0.0))])
+    in_band = (frequencies > 2.0 * SLOWEST) & (frequencies < QUICKEST)
+    return float(frequencies[np.argmax(np.where(in_band, power, 0.0))])

@@ -5,7 +5,18 @@ The names are a contract: reports, tests and users rely on them.
 
 import copyreg
 
-from host.catalogue import actuator, environment, heave, kinematics, nuisance, pitch, sensor, surge, unknown
+from host.catalogue import (
+    actuator,
+    environment,
+    heave,
+    kinematics,
+    moments,
+    nuisance,
+    pitch,
+    sensor,
+    surge,
+    unknown,
+)
 from host.equations import Effect, Structure
 
 CATALOGUE: tuple[Effect, ...] = (
@@ -19,7 +30,8 @@ CATALOGUE: tuple[Effect, ...] = (
 )
 BY_NAME = {effect.name: effect for effect in CATALOGUE}
 UNKNOWN = {effect.name: effect for effect in unknown.FORMS}
-_ALL = BY_NAME | UNKNOWN | {e.name: e for e in (nuisance.FREE_TRIM, unknown.ANY_SMOOTH_FORCE)}
+_TOOLS = (nuisance.FREE_TRIM, unknown.ANY_SMOOTH_FORCE, *moments.SCANS.values())
+_ALL = BY_NAME | UNKNOWN | {effect.name: effect for effect in _TOOLS}
 ORDINARY = (
     "heave_pitch_rate_coupling",
     "large_angle_kinematics",

@@ -62,8 +62,6 @@ def _at_command(c: Chain) -> ca.SX:
     return c.command
 
 
-_SHARES = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)
-
 EFFECTS = (
     Effect(
         name="rudder_offset",
@@ -93,7 +91,7 @@ EFFECTS = (
         sentence="The plane meets its stops before the commanded angle.",
         equation="delta = command, at most plane_limit either way",
         manoeuvre="plane steps of increasing size up to the largest command",
-        probes=((0.92,), (0.7,), (0.45,), (0.27,), (0.14,)),
+        probes=((0.97,), (0.85,), (0.7,), (0.45,), (0.27,), (0.14,)),
         scales=("rudder",),
         sizes=(),
         command=_saturation,
@@ -165,7 +163,7 @@ EFFECTS = (
         sentence="The plane's effect changed at one moment: a fin was damaged, fouled or lost.",
         equation="acting angle = delta (1 + effectiveness_step (t > effectiveness_time))",
         manoeuvre="the same plane steps before and after",
-        probes=tuple((-0.2, share) for share in _SHARES),
+        probes=((0.0, 0.5),),
         scales=("", "duration"),
         plane=_effectiveness,
     ),

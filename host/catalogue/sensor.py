@@ -9,20 +9,12 @@ def _lever_arm(c: Chain) -> None:
     c.sensed_depth = c.sensed_depth - c.p["sensor_forward"] * ca.sin(c.theta)
 
 
-def _depth_lag(c: Chain) -> None:
-    c.rates["depth_lag"] = (c.zeta - c.extra["depth_lag"]) / c.p["depth_lag_time"]
-
-
 def _lagged_depth(c: Chain) -> None:
     c.sensed_depth = c.sensed_depth - c.zeta + c.extra["depth_lag"]
 
 
 def _bias(c: Chain) -> None:
     c.sensed_pitch = c.sensed_pitch + c.p["pitch_zero"]
-
-
-def _pitch_lag(c: Chain) -> None:
-    c.rates["pitch_lag"] = (c.theta - c.extra["pitch_lag"]) / c.p["pitch_lag_time"]
 
 
 def _lagged_pitch(c: Chain) -> None:
@@ -52,7 +44,7 @@ EFFECTS = (
         equation="recorded depth' = (zeta - recorded depth)/depth_lag_time",
         manoeuvre="quick reversals of a steep climb and dive",
         probes=((0.3,), (1.5,)),
-        force=_depth_lag,
+        follows=("zeta", "depth_lag_time"),
         sense=_lagged_depth,
         state="depth_lag",
         initial=lambda c: c.zeta,
@@ -77,7 +69,7 @@ EFFECTS = (
         equation="recorded pitch' = (theta - recorded pitch)/pitch_lag_time",
         manoeuvre="quick pitch reversals with the depth recorded at a high rate",
         probes=((0.2,), (0.8,)),
-        force=_pitch_lag,
+        follows=("theta", "pitch_lag_time"),
         sense=_lagged_pitch,
         state="pitch_lag",
         initial=lambda c: c.theta,

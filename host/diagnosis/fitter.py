@@ -7,6 +7,7 @@ import numpy as np
 
 from host.catalogue import named, structure_of
 from host.catalogue.kin import OFFSETS, as_trim, measure_alike
+from host.catalogue.moments import FIRST, LAST
 from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import SPANS
 from host.diagnosis.absence import one_step_without
@@ -30,10 +31,12 @@ HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is
 RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exact twins
 COMPRESSED = "depth_dependent_buoyancy"
 FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
+FEW = 2  # members of a set, the free trim among them, that lacks the most
 # Enough to rank sets; those that count are polished.
 FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 12, 0.2
 EXACT, SETTLED = 1e-3, 0.005  # of a log-likelihood, that an iteration of a polished fit may still gain
-INSTANT, USUAL_DAMPING = -10.0, -1.0  # 1/s, of a1: a base that lacks an effect may follow its plane at once
+# 1/s, of a1: a base that lacks an effect may follow its plane at once, or hardly at all.
+INSTANT, USUAL_DAMPING, IDLE = -10.0, -1.0, -0.1
 NOT_THERE = 1.2  # times the sensor noise that the set left elsewhere: it has ended in another valley
 ROUGHLY = 1.0  # of a log-likelihood: a set does at least as well as with one member less
 
@@ -58,6 +61,8 @@ class Fitter:
             # Where the speed is measured its loss is data, and there is nothing in it to estimate.
             self.held |= {name: 0.0 for name in ("c_ud", "c_uq")} | {"speed_time": 1.0}
         self.held |= dict.fromkeys(SPANS.values(), max(float(r.time[-1]) for r in recordings))
+        self.held[FIRST] = min(float(r.time[0]) for r in recordings)
+        self.held[LAST] = max(float(r.time[-1]) for r in recordings)
         self._longest_substep = LONGEST_SUBSTEP
         self._inputs: dict[tuple[Names, bool], list[Inputs]] = {}
         self.base = self._base() if known is None else known
@@ -159,6 +164,8 @@ class Fitter:
     ) -> Explanation:
         """The parent's set with one effect more, from the two most promising of its start values.
 
+        And where the parent may be bent into another valley than the truth, from what needs no parent.
+
         values  start values of the effect's parameters from elsewhere, beside its own probes
         rival   the parent's set with another effect that does the same work: a start there, too, as the
                 coefficients of a parent without either may be bent into another valley
@@ -166,10 +173,12 @@ class Fitter:
         likely = sorted(probed(self, parent, named(name), values), key=lambda pair: -pair[0])
         names = parent.names | {name}
         starts = [self.point(names, parent, name, probe) for _, probe in likely[:2]]
+        guess = self._guess(starts[0], names) if self._may_be_bent(parent) else None
         if self.excess(parent.fit) > FAR:
-            starts = [starts[0], self._guess(starts[0], names)]
-        if parent.fit.parameters[A1] < INSTANT:
-            starts += [_slower(start) for start in starts]
+            del starts[1:]
+        if not INSTANT < parent.fit.parameters[A1] < IDLE:
+            starts += [_with_usual_heave(start) for start in starts]
+        starts += [] if guess is None else [guess]
         if rival is not None:
             starts += [self.point(names, rival, name, probe) for _, probe in likely[:2]]
             starts += [
@@ -179,6 +188,11 @@ class Fitter:
         if is_white and named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
             fit = self._fit([self._idle(names, parent, name, likely[0][1])])
         return self._explained(names, fit)
+
+    def _may_be_bent(self, parent: Explanation) -> bool:
+        """Whether the coefficients of a parent may have gone far to make up for what it lacks."""
+        is_white = not parent.fit.has_process_noise
+        return is_white and (len(parent.names) <= FEW or self.excess(parent.fit) > FAR)
 
     def _idle(self, names: Names, parent: Explanation, name: str, probe: Array) -> Point:
         """A start at which the effect that joins does not act yet, as near as its bounds allow."""
@@ -346,10 +360,11 @@ class Fitter:
         return output_error(start, inputs, free, tolerance=tolerance)
 
 
-def _slower(start: Point) -> Point:
-    """A start with the heave damping of a usual vehicle and the same steady heave velocity."""
+def _with_usual_heave(start: Point) -> Point:
+    """A start with the heave damping of a usual vehicle; if it was fast, with the same steady velocity."""
     parameters = start.parameters.copy()
-    parameters[[A1, B1]] *= USUAL_DAMPING / parameters[A1]
+    parameters[B1] *= USUAL_DAMPING / parameters[A1] if parameters[A1] < INSTANT else 0.0
+    parameters[A1] = USUAL_DAMPING
     return replace(start, parameters=parameters)
 
 

@@ -1,11 +1,13 @@
 """What an effect could gain beside others, one Gauss-Newton step ahead, and from which start values."""
 
+from dataclasses import replace
 from math import log
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from host.catalogue import named, structure_of
+from host.catalogue.moments import COUNT, FIRST, LAST, SCANS, sizes
 from host.catalogue.unknown import ANY_SMOOTH_FORCE, FORMS
 from host.diagnosis.explanation import Explanation
 from host.equations import Effect
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
 
 LINES_TRIED = 3
+MOMENTS_TRIED = 3
 
 
 def gain(fitter: "Fitter", parent: Explanation, name: str, values: list[Array], is_thorough: bool) -> float:
@@ -100,7 +103,38 @@ def _probes(fitter: "Fitter", effect: Effect, parent: Explanation) -> list[Array
         probes = [
             np.array([*probes[0][:-1], period]) for period in _periods(fitter, effect.periods, parent.fit)
         ]
+    if effect.name in SCANS:
+        probes = [np.array([*probes[0][:-1], moment]) for moment in _moments(fitter, effect.name, parent)]
     return probes
+
+
+def _moments(fitter: "Fitter", name: str, parent: Explanation) -> list[float]:
+    """The times, s, at which a change of this kind would gain most on top of the parent, the best first."""
+    first, last = fitter.held[FIRST], fitter.held[LAST]
+    coarse = _scanned(fitter, name, parent, first, last)
+    apart = (last - first) / (COUNT + 1)
+    fine = _scanned(fitter, name, parent, coarse[0] - apart, coarse[0] + apart)
+    return [fine[0], *coarse[1:MOMENTS_TRIED]]
+
+
+def _scanned(fitter: "Fitter", name: str, parent: Explanation, first: float, last: float) -> list[float]:
+    """The best of the moments between two times, of those side by side only the better."""
+    scan = SCANS[name]
+    names = parent.names | {scan.name}
+    point = fitter.point(names, parent, scan.name, np.zeros(len(scan.parameters)))
+    own = np.array(point.structure.names)
+    limits = np.where(own == FIRST, first, np.where(own == LAST, last, point.parameters))
+    point = replace(point, parameters=limits)
+    white, cost = _whitened(point, fitter.inputs(names, parent.fit.has_process_noise), parent)
+    times = first + (last - first) * np.arange(1, COUNT + 1) / (COUNT + 1)
+    if not np.isfinite(cost):
+        return [float(time) for time in times[COUNT // 6 :: COUNT // 6]]
+    others = fitter.free(names) & ~np.isin(own, sizes(name))
+    steps = (GaussNewton(white, point, others | (own == size)) for size in sizes(name))
+    left = np.array([step.predicted_cost(cost) for step in steps])
+    beside = np.concatenate([[np.inf], left, [np.inf]])
+    dips = np.flatnonzero((left <= beside[:-2]) & (left <= beside[2:]))
+    return [float(times[k]) for k in dips[np.argsort(left[dips])]]
 
 
 def _periods(fitter: "Fitter", limits: tuple[float, float], fit: Fit) -> list[float]:

@@ -8,6 +8,7 @@ from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import BY_NAME, CATALOGUE, UNKNOWN, structure_of
 from host.propagate import free_run, innovations, inputs_of
+from host.recording import Recording
 
 NAMES_OF_THE_FORMAT = {
     "heave_pitch_rate_coupling", "heave_quadratic_drag", "net_buoyancy", "depth_dependent_buoyancy",
@@ -51,20 +52,41 @@ def test_effect_acts_and_its_sensitivities_are_exact(name: str) -> None:
         assert np.allclose(sensitivity[:, index], slope, atol=2e-4 * max(np.abs(slope).max(), 1e-6))
 
 
+EACH = 10
+
+
+def finer(rows: Recording) -> Recording:
+    """The same commands on ten rows each."""
+    count = rows.time.size * EACH
+    blank, step = np.full(count, np.nan), rows.step / EACH
+    return replace(
+        rows, step=step, time=step * np.arange(count), rudder=np.repeat(rows.rudder, EACH), depth=blank,
+        pitch=blank, speed=blank, pitch_rate=blank,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("lag", [0.03, 0.15, 1.0])
+@pytest.mark.parametrize("name", ["pitch_sensor_lag", "depth_sensor_lag"])
+def test_a_sensor_lag_is_exact_however_short_beside_the_rows(name: str, lag: float) -> None:
+    rows = hidden_dive(duration=30.0)
+    structure, values = structure_of((name,)), np.array([*BASE.values(), 0.0, 0.0, lag])
+    run = free_run(values, START, inputs_of(rows, structure, longest_substep=0.1)).outputs
+    true = free_run(values, START, inputs_of(finer(rows), structure)).outputs[:, ::EACH]
+    channel = 0 if name.startswith("pitch") else 1
+    # As if the lag were another by less than 1 ms.
+    rate = np.abs(np.gradient(true[channel], rows.step)).max()
+    assert np.abs(run - true)[channel].max() < 1e-3 * rate
+
+
 @pytest.mark.parametrize("delay", [0.04, 0.13, 0.25])
 def test_a_delay_is_that_of_the_command_however_coarse_the_rows(delay: float) -> None:
     rows = hidden_dive(duration=30.0)
     values = np.array([*BASE.values(), 0.0, 0.0])
     run = free_run(np.append(values, delay), START, inputs_of(rows, structure_of(("actuator_delay",))))
-    each = 10  # finer rows, on which the commands are moved by the delay
-    late = np.concatenate([np.full(round(delay * 100.0), rows.rudder[0]), np.repeat(rows.rudder, each)])
-    count = rows.time.size * each
-    blank = np.full(count, np.nan)
-    fine = replace(
-        rows, step=0.01, time=0.01 * np.arange(count), rudder=late[:count], depth=blank, pitch=blank,
-        speed=blank, pitch_rate=blank,
-    )  # fmt: skip
-    true = free_run(values, START, inputs_of(fine)).outputs[:, ::each]
+    late = np.concatenate([np.full(round(delay * 100.0), rows.rudder[0]), np.repeat(rows.rudder, EACH)])
+    fine = finer(rows)
+    moved = replace(fine, rudder=late[: fine.time.size])
+    true = free_run(values, START, inputs_of(moved)).outputs[:, ::EACH]
     assert np.abs(run.outputs - true).max() < 1e-3 * np.ptp(true, axis=1).min()
 
 
