@@ -12,6 +12,8 @@ it began; so the profile of the likelihood over a1 is walked on both sides, and 
 from dataclasses import replace
 from math import log
 
+import numpy as np
+
 from host.equations import NAMES
 from host.fit import Fit, Rival
 from host.gauss_newton import Point
@@ -25,7 +27,8 @@ WORTH_ENTERING = 40.0  # of a log-likelihood below the best, that a point of the
 ALMOST_AS_LIKELY = 3.0  # of a log-likelihood: odds of 20 to 1 and less rule nothing out
 APART = 4.0  # standard deviations between two modes
 USUAL_SPEED, SPEED_FACTOR = 1.5, 3.0  # m/s; gliders make 0.3, torpedoes 10
-A1, B1, U0 = (NAMES.index(name) for name in ("a1", "b1", "u0"))
+A1, A2, A3, B1, B2, U0 = (NAMES.index(name) for name in ("a1", "a2", "a3", "b1", "b2", "u0"))
+LAGS = ("lag_time", "pitch_lag_time")
 
 
 def other_valleys(fit: Fit, inputs: list[Inputs]) -> list[Fit]:
@@ -47,6 +50,28 @@ def other_valleys(fit: Fit, inputs: list[Inputs]) -> list[Fit]:
             start = Point(fit.structure, walked.parameters, walked.initial, walked.noise)
             ends.append(output_error(start, inputs, fit.free))
     return ends
+
+
+def with_poles_swapped(point: Point) -> list[Point]:
+    """The point with a lag in series and a real pole of pitch in each other's place, the gain as it was.
+
+    Their product is the same to the sensor of pitch; only depth, or the plane's own motion, tells them apart.
+    """
+    names, values = list(point.structure.names), point.parameters
+    a2, a3, b2 = values[[A2, A3, B2]]
+    poles = np.roots([1.0, -a2, -a3])
+    swapped = []
+    for lag in (names.index(name) for name in LAGS if name in names):
+        if np.iscomplex(poles).any() or poles.real.max() >= 0.0:
+            break
+        for pole, other in (poles.real, poles.real[::-1]):
+            moved = values.copy()
+            moved[lag] = -1.0 / pole
+            stays, comes = other, -1.0 / values[lag]
+            moved[[A2, A3]] = stays + comes, -stays * comes
+            moved[B2] = b2 * moved[A3] / a3
+            swapped.append(replace(point, parameters=point.structure.clipped(moved)))
+    return swapped
 
 
 def plausibility(fit: Fit) -> float:

@@ -24,7 +24,7 @@ from host.output_error import annealed, free_run_cost, output_error
 from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
 from host.recording import Array, Recording
 from host.rounding import thinned
-from host.valleys import log_prior, other_valleys, plausibility, with_rivals
+from host.valleys import LAGS, log_prior, other_valleys, plausibility, with_poles_swapped, with_rivals
 from host.wave_forces import wave_forces, wave_forces_from
 
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
@@ -185,6 +185,9 @@ class Fitter:
                 self.point(names, rival, name, probe) for probe in self._same_size(rival, parent, name)
             ]
         fit, is_white = self._fit(starts), not parent.fit.has_process_noise
+        if is_white and named(name).parameters[0].name in LAGS:
+            end = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+            fit = self._fit([end, *with_poles_swapped(end)])
         if is_white and named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
             fit = self._fit([self._idle(names, parent, name, likely[0][1])])
         return self._explained(names, fit)

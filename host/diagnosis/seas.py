@@ -49,12 +49,16 @@ def among_waves(rough: Search, best: Explanation) -> tuple[Search, Explanation, 
     A filter that takes waves for white forces follows the measurements in the wrong band, and so hides what
     acts beside them. While sets are compared the waves stay as they were first found.
     """
-    fitter, swings = rough.fitter, SWINGING_MOMENT.name in best.names
-    if WAVES in best.names or not (best.fit.has_process_noise or swings):
+    fitter, swing = rough.fitter, best.names & {SWINGING_MOMENT.name, WAVES}
+    if WAVES in best.names and not best.fit.has_process_noise:
+        return rough, best, None  # regular ones
+    if not (best.fit.has_process_noise or swing):
         return rough, best, None
     rough.on_progress("waves")
     # What swings in the band of waves may be the waves.
-    plain = rough.without(best, SWINGING_MOMENT.name) if swings else best
+    plain = best
+    for name in sorted(swing):
+        plain = rough.without(plain, name)
     white = plain if plain.fit.has_process_noise else fitter.with_sea(plain)
     first = fitter.with_waves(white)
     period = 2.0 * np.pi / first.fit.waves[0]

@@ -1,0 +1,72 @@
+"""Where fits of sets begin: at the likeliest moment, in every valley that a lag or a bent base may hide."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hidden_dive import BASE, hidden_dive
+
+from host.catalogue import structure_of
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import Fitter
+from host.gauss_newton import Point
+from host.propagate import free_run, inputs_of
+from host.recording import Array
+from host.valleys import with_poles_swapped
+
+AT_REST = np.array([0.0, 0.0, 0.0, 20.0])
+WEAKENED_AT = 31.3  # under a large plane angle, so that the recording can tell
+
+
+def weakened(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+    lost = -0.02 * plane * (time > WEAKENED_AT)
+    return lost * BASE["b1"], lost * BASE["b2"], 0.0
+
+
+def test_a_change_too_small_to_be_seen_from_another_moment_is_found() -> None:
+    fitter = Fitter([hidden_dive(weakened)])
+    found = fitter.grown(fitter.base, "rudder_effectiveness_change", [])
+    values = dict(zip(found.fit.structure.names, found.fit.parameters, strict=True))
+    assert values["effectiveness_time"] == pytest.approx(WEAKENED_AT, abs=0.5)
+    assert values["effectiveness_step"] == pytest.approx(-0.02, abs=0.005)
+    assert found.bic < fitter.base.bic - 20.0
+
+
+@pytest.mark.parametrize("name", ["pitch_sensor_lag", "actuator_lag"])
+def test_a_lag_and_a_pole_of_pitch_may_trade_places(name: str) -> None:
+    rows, structure = hidden_dive(duration=30.0), structure_of((name,))
+    rows.rudder[:5] = 0.0  # from where a lagging plane begins
+    slow = {**BASE, "a2": -5.0, "a3": -4.0}  # poles at -1 and -4 1/s
+    point = Point(structure, np.array([*slow.values(), 0.0, 0.0, 0.5]), [AT_REST], np.zeros(4))
+    inputs = inputs_of(rows, structure)
+    true = free_run(point.parameters, AT_REST, inputs).outputs
+    swapped = with_poles_swapped(point)
+    assert sorted(one.parameters[-1] for one in swapped) == pytest.approx([0.25, 1.0])
+    for one in swapped:
+        run = free_run(one.parameters, AT_REST, inputs).outputs
+        np.testing.assert_allclose(run[0], true[0], atol=2e-4)
+        assert np.abs(one.parameters[:6] - point.parameters[:6]).max() > 0.1
+
+
+def test_a_pitch_that_swings_has_no_pole_to_trade() -> None:
+    point = Point(
+        structure_of(("pitch_sensor_lag",)), np.array([*BASE.values(), 0.0, 0.0, 0.5]), [AT_REST], np.zeros(4)
+    )
+    assert with_poles_swapped(point) == []
+
+
+@pytest.mark.parametrize(("a1", "b1"), [(-25.0, 10.0), (-1e-4, 0.02)])
+def test_a_base_without_a_usual_heave_is_no_place_to_begin(
+    a1: float, b1: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def coupled(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+        return 0.8 * x[1], 0.0, 0.0
+
+    fitter = Fitter([hidden_dive(coupled)])
+    monkeypatch.setattr(fitter, "_may_be_bent", lambda _: False)
+    bent = fitter.base.fit.parameters.copy()
+    bent[[0, 3]] = a1, b1
+    parent = Explanation(fitter.base.names, replace(fitter.base.fit, parameters=bent), fitter.base.bic)
+    found = fitter.polished(fitter.grown(parent, "heave_pitch_rate_coupling", []))
+    assert found.fit.parameters[0] == pytest.approx(BASE["a1"], abs=0.1)
+    assert found.fit.parameters[-1] == pytest.approx(0.8, abs=0.1)
