@@ -6,14 +6,15 @@ from math import log
 import numpy as np
 
 from host.catalogue import named, structure_of
-from host.catalogue.kin import OFFSETS, as_trim, measure_alike
+from host.catalogue.kin import OFFSETS, as_trim
 from host.catalogue.moments import FIRST, LAST
 from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import SPANS
 from host.diagnosis.absence import one_step_without
 from host.diagnosis.explanation import Explanation, Names
-from host.diagnosis.first_guess import accelerations, first_guess
-from host.diagnosis.prospects import form_gains, gain, probed
+from host.diagnosis.first_guess import accelerations
+from host.diagnosis.prospects import form_gains, gain
+from host.diagnosis.starts import guess, idle, is_far, starts_of
 from host.equations import NAMES
 from host.filter_error import filter_error, filter_error_from
 from host.fit import Fit
@@ -30,31 +31,26 @@ from host.wave_forces import wave_forces, wave_forces_from
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
 RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exact twins
 COMPRESSED = "depth_dependent_buoyancy"
-FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
-FEW = 2  # members of a set, the free trim among them, that lacks the most
 # Enough to rank sets; those that count are polished.
 FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 12, 0.2
 EXACT, SETTLED = 1e-3, 0.005  # of a log-likelihood, that an iteration of a polished fit may still gain
-# 1/s, of a1: a base that lacks an effect may follow its plane at once, or hardly at all.
-INSTANT, USUAL_DAMPING, IDLE = -10.0, -1.0, -0.1
 NOT_THERE = 1.2  # times the sensor noise that the set left elsewhere: it has ended in another valley
 ROUGHLY = 1.0  # of a log-likelihood: a set does at least as well as with one member less
-
-A1, B1 = NAMES.index("a1"), NAMES.index("b1")
 
 
 class Fitter:
     """All that the fits of one diagnosis share: recordings, noise floor, what is held, where fits start.
 
-    known  an explanation of other stretches of the same vehicle; without one the base model is fitted
+    known    an explanation of other stretches of the same vehicle; without one the base model is fitted
+    thinned  the recordings for what takes errors for normal
     """
 
     def __init__(self, recordings: list[Recording], known: Explanation | None = None) -> None:
         self.floor = noise_floor(recordings)
         self.recordings = recordings
-        self._thinned = thinned(recordings)
+        self.thinned = thinned(recordings)
         self._steps = resolution(recordings)
-        self.accelerations = accelerations(self._thinned)
+        self.accelerations = accelerations(self.thinned)
         self.held = dict(HELD)
         if recordings[0].has_speed:
             self.held["u0"] = float(np.mean([r.speed.mean() for r in recordings]))
@@ -68,7 +64,7 @@ class Fitter:
         self.base = self._base() if known is None else known
         parameters = self.base.fit.parameters
         self._longest_substep = longest_substep(parameters)
-        self._speed = float(parameters[NAMES.index("u0")])
+        self.speed = float(parameters[NAMES.index("u0")])
         self.scales = {
             "": 1.0,
             "rudder": float(max(np.abs(r.rudder).max() for r in recordings)) or 1.0,
@@ -170,38 +166,14 @@ class Fitter:
         rival   the parent's set with another effect that does the same work: a start there, too, as the
                 coefficients of a parent without either may be bent into another valley
         """
-        likely = sorted(probed(self, parent, named(name), values), key=lambda pair: -pair[0])
-        names = parent.names | {name}
-        starts = [self.point(names, parent, name, probe) for _, probe in likely[:2]]
-        guess = self._guess(starts[0], names) if self._may_be_bent(parent) else None
-        if self.excess(parent.fit) > FAR:
-            del starts[1:]
-        if not INSTANT < parent.fit.parameters[A1] < IDLE:
-            starts += [_with_usual_heave(start) for start in starts]
-        starts += [] if guess is None else [guess]
-        if rival is not None:
-            starts += [self.point(names, rival, name, probe) for _, probe in likely[:2]]
-            starts += [
-                self.point(names, rival, name, probe) for probe in self._same_size(rival, parent, name)
-            ]
+        starts = starts_of(self, parent, name, values, rival)
         fit, is_white = self._fit(starts), not parent.fit.has_process_noise
         if is_white and named(name).parameters[0].name in LAGS:
             end = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
             fit = self._fit([end, *with_poles_swapped(end)])
         if is_white and named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
-            fit = self._fit([self._idle(names, parent, name, likely[0][1])])
-        return self._explained(names, fit)
-
-    def _may_be_bent(self, parent: Explanation) -> bool:
-        """Whether the coefficients of a parent may have gone far to make up for what it lacks."""
-        is_white = not parent.fit.has_process_noise
-        return is_white and (len(parent.names) <= FEW or self.excess(parent.fit) > FAR)
-
-    def _idle(self, names: Names, parent: Explanation, name: str, probe: Array) -> Point:
-        """A start at which the effect that joins does not act yet, as near as its bounds allow."""
-        point, effect = self.point(names, parent, name, probe), named(name)
-        values = np.where(np.isin(point.structure.names, effect.size_names), 0.0, point.parameters)
-        return replace(point, parameters=point.structure.clipped(values))
+            fit = self._fit([idle(starts[0], name)])
+        return self._explained(parent.names | {name}, fit)
 
     def gain(self, parent: Explanation, name: str, values: list[Array], is_thorough: bool) -> float:
         """See host.diagnosis.prospects, as for `form_gains`: here for the workers to call."""
@@ -220,8 +192,8 @@ class Fitter:
             moved = replace(start, parameters=np.array([known[own] for own in start.structure.names]))
             start = min(start, moved, key=lambda point: free_run_cost(point, self.inputs(names)))
         starts = [start]
-        if self.excess(parent.fit) > FAR:
-            starts.append(self._guess(start, names))
+        if is_far(self, parent):
+            starts.append(guess(self, start, names))
         return self._explained(names, self._fit(starts))
 
     def polished(self, explanation: Explanation, tolerance: float = SETTLED) -> Explanation:
@@ -298,22 +270,12 @@ class Fitter:
             structure, steps = structure_of(names), None if for_filter else self._steps
             self._inputs[names, for_filter] = [
                 inputs_of(recording, structure, self._longest_substep, steps)
-                for recording in (self._thinned if for_filter else self.recordings)
+                for recording in (self.thinned if for_filter else self.recordings)
             ]
         return self._inputs[names, for_filter]
 
     def _explained(self, names: Names, fit: Fit) -> Explanation:
         return Explanation(names, fit, self.bic(fit, names))
-
-    def _guess(self, start: Point, names: Names) -> Point:
-        """The rough values of regression where it gives some, `start` elsewhere, moved into their valley."""
-        rough = first_guess(self._thinned, self._speed, names)
-        rough = {name: value for name, value in rough.items() if name not in self.held}
-        own = zip(start.structure.names, start.parameters, strict=True)
-        values = np.array([rough.get(name, value) for name, value in own])
-        point = Point(start.structure, values, start.initial, np.array([*self.floor, 0.0, 0.0]))
-        inputs = self.inputs(names, for_filter=True)
-        return annealed(point, inputs, self.free(names), self.accelerations)
 
     def point(
         self, names: Names, parent: Explanation, added: str | None = None, probe: Array | None = None
@@ -339,19 +301,6 @@ class Fitter:
         on = Point(structure, best.parameters, best.initial, best.noise)
         return output_error(on, inputs, free, MOST_ITERATIONS, TOLERANCE)
 
-    def _same_size(self, rival: Explanation, parent: Explanation, name: str) -> list[Array]:
-        """A start of an effect where the one that the rival has in its place ended, if these measure alike.
-
-        Of two limits of the plane each is blind but near the right angle.
-        """
-        (other,) = rival.names - parent.names
-        effect, its = named(name), named(other)
-        if not measure_alike(effect, its):
-            return []
-        value = rival.fit.parameters[rival.fit.structure.names.index(its.parameters[0].name)]
-        scales = [self.scales[scale] for scale in (effect.scales or ("",) * len(effect.parameters))]
-        return [np.array([value, *(np.array(effect.probes[0]) * scales)[1:]])]
-
     def _carried_on(self, start: Point, tolerance: float = SETTLED) -> Fit:
         names = frozenset(effect.name for effect in start.structure.effects)
         free, has_forces = self.free(names), bool(start.noise[2:].any())
@@ -361,14 +310,6 @@ class Fitter:
         if has_forces:
             return filter_error_from(start, inputs, free)
         return output_error(start, inputs, free, tolerance=tolerance)
-
-
-def _with_usual_heave(start: Point) -> Point:
-    """A start with the heave damping of a usual vehicle; if it was fast, with the same steady velocity."""
-    parameters = start.parameters.copy()
-    parameters[B1] *= USUAL_DAMPING / parameters[A1] if parameters[A1] < INSTANT else 0.0
-    parameters[A1] = USUAL_DAMPING
-    return replace(start, parameters=parameters)
 
 
 def _first(values: Array) -> float:

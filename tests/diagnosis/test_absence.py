@@ -55,8 +55,8 @@ def test_a_set_does_no_worse_than_with_a_member_less(
     fitter, both = fitted
     less = fitter.grown(fitter.base, "heave_pitch_rate_coupling", [])
     # A drag that drives instead of braking: from there the search runs away.
-    monkeypatch.setattr("host.diagnosis.fitter.probed", lambda *_: [(0.0, np.array([1000.0]))])
-    monkeypatch.setattr(fitter, "_may_be_bent", lambda _: False)
+    monkeypatch.setattr("host.diagnosis.starts.probed", lambda *_: [(0.0, np.array([1000.0]))])
+    monkeypatch.setattr("host.diagnosis.starts.may_be_bent", lambda *_: False)
     more = fitter.polished(fitter.grown(less, "heave_quadratic_drag", []))
     assert more.fit.log_likelihood > both.fit.log_likelihood - 2.0
 

@@ -63,7 +63,7 @@ def test_a_base_without_a_usual_heave_is_no_place_to_begin(
         return 0.8 * x[1], 0.0, 0.0
 
     fitter = Fitter([hidden_dive(coupled)])
-    monkeypatch.setattr(fitter, "_may_be_bent", lambda _: False)
+    monkeypatch.setattr("host.diagnosis.starts.may_be_bent", lambda *_: False)
     bent = fitter.base.fit.parameters.copy()
     bent[[0, 3]] = a1, b1
     parent = Explanation(fitter.base.names, replace(fitter.base.fit, parameters=bent), fitter.base.bic)

@@ -1,0 +1,96 @@
+"""Where the fit of a set begins: from a parent with one effect less, and from what needs no parent.
+
+A search ends in the valley in which it begins, and a parent that lacks an effect may be bent far from the
+truth to make up for it. So a set begins from several places, goes a few steps from each and on from the best.
+"""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from host.catalogue import named
+from host.catalogue.kin import measure_alike
+from host.diagnosis.explanation import Explanation, Names
+from host.diagnosis.first_guess import first_guess
+from host.diagnosis.prospects import probed
+from host.equations import NAMES
+from host.gauss_newton import Point
+from host.output_error import annealed
+from host.recording import Array
+
+if TYPE_CHECKING:
+    from host.diagnosis.fitter import Fitter
+
+FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
+FEW = 2  # members of a set, the free trim among them, that lacks the most
+# 1/s, of a1: a base that lacks an effect may follow its plane at once, or hardly at all.
+INSTANT, USUAL_DAMPING, IDLE = -10.0, -1.0, -0.1
+A1, B1 = NAMES.index("a1"), NAMES.index("b1")
+
+
+def starts_of(
+    fitter: "Fitter", parent: Explanation, name: str, values: list[Array], rival: Explanation | None
+) -> list[Point]:
+    """Starts of the parent's set with one effect more, the most promising first; see Fitter.grown."""
+    likely = sorted(probed(fitter, parent, named(name), values), key=lambda pair: -pair[0])
+    names = parent.names | {name}
+    starts = [fitter.point(names, parent, name, probe) for _, probe in likely[:2]]
+    guesses = [guess(fitter, starts[0], names)] if may_be_bent(fitter, parent) else []
+    if is_far(fitter, parent):
+        del starts[1:]
+    if not INSTANT < parent.fit.parameters[A1] < IDLE:
+        starts += [_with_usual_heave(start) for start in starts]
+    starts += guesses
+    if rival is not None:
+        probes = [probe for _, probe in likely[:2]] + _same_size(fitter, rival, parent, name)
+        starts += [fitter.point(names, rival, name, probe) for probe in probes]
+    return starts
+
+
+def idle(start: Point, name: str) -> Point:
+    """A start at which the effect does not act yet, as near as its bounds allow."""
+    values = np.where(np.isin(start.structure.names, named(name).size_names), 0.0, start.parameters)
+    return replace(start, parameters=start.structure.clipped(values))
+
+
+def is_far(fitter: "Fitter", parent: Explanation) -> bool:
+    """Whether a set leaves much."""
+    return fitter.excess(parent.fit) > FAR
+
+
+def may_be_bent(fitter: "Fitter", parent: Explanation) -> bool:
+    """Whether the coefficients of a parent may have gone far to make up for what it lacks."""
+    return not parent.fit.has_process_noise and (len(parent.names) <= FEW or is_far(fitter, parent))
+
+
+def guess(fitter: "Fitter", start: Point, names: Names) -> Point:
+    """The rough values of regression where it gives some, `start` elsewhere, moved into their valley."""
+    rough = first_guess(fitter.thinned, fitter.speed, names)
+    rough = {name: value for name, value in rough.items() if name not in fitter.held}
+    own = zip(start.structure.names, start.parameters, strict=True)
+    values = np.array([rough.get(name, value) for name, value in own])
+    point = Point(start.structure, values, start.initial, np.array([*fitter.floor, 0.0, 0.0]))
+    return annealed(point, fitter.inputs(names, for_filter=True), fitter.free(names), fitter.accelerations)
+
+
+def _with_usual_heave(start: Point) -> Point:
+    """A start with the heave damping of a usual vehicle; if it was fast, with the same steady velocity."""
+    parameters = start.parameters.copy()
+    parameters[B1] *= USUAL_DAMPING / parameters[A1] if parameters[A1] < INSTANT else 0.0
+    parameters[A1] = USUAL_DAMPING
+    return replace(start, parameters=parameters)
+
+
+def _same_size(fitter: "Fitter", rival: Explanation, parent: Explanation, name: str) -> list[Array]:
+    """A start of an effect where the one that the rival has in its place ended, if these measure alike.
+
+    Of two limits of the plane each is blind but near the right angle.
+    """
+    (other,) = rival.names - parent.names
+    effect, its = named(name), named(other)
+    if not measure_alike(effect, its):
+        return []
+    value = rival.fit.parameters[rival.fit.structure.names.index(its.parameters[0].name)]
+    scales = [fitter.scales[scale] for scale in (effect.scales or ("",) * len(effect.parameters))]
+    return [np.array([value, *(np.array(effect.probes[0]) * scales)[1:]])]
