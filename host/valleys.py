@@ -1,4 +1,4 @@
-"""Other valleys of the likelihood, in which heave damping and speed trade places.
+"""Other valleys of the likelihood: heave damping and speed trade places, or a lag and a pole of pitch.
 
 Depth follows from the plane by
 
@@ -6,7 +6,8 @@ Depth follows from the plane by
 
 A pole a1 that nearly cancels a zero can sit at another zero nearly as well, with another u0 and b1: where the
 speed is not measured, one recording may have two maxima with different heave. A search ends in that in which
-it began; so the profile of the likelihood over a1 is walked on both sides, and every dip is entered.
+it began; so the profile of the likelihood over a1 is walked on both sides, and every dip is entered. A lag in
+series with the pitch is one pole more: which of the poles is the lag's, pitch alone does not say.
 """
 
 from dataclasses import replace
@@ -32,15 +33,17 @@ LAGS = ("lag_time", "pitch_lag_time")
 
 
 def other_valleys(fit: Fit, inputs: list[Inputs]) -> list[Fit]:
-    """Ends of output-error searches that began with another heave damping; none where the speed is held.
+    """Ends of output-error searches that began with lag and pole swapped, or with another heave damping.
 
-    Among them may be a likelier one, and the one that the search began with again.
+    Among them may be a likelier one, and the one that the search began with again. Where the speed is held,
+    heave damping has one valley.
     """
+    here = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+    ends = [output_error(start, inputs, fit.free) for start in with_poles_swapped(here)]
     if not (fit.free[A1] and fit.free[U0]):
-        return []
+        return ends
     held = fit.free.copy()
     held[A1] = False
-    ends = []
     for stride in STRIDES:
         parameters = fit.parameters.copy()
         parameters[[A1, B1]] *= stride  # the steady heave velocity stays

@@ -10,9 +10,10 @@ from host.catalogue import structure_of
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.gauss_newton import Point
+from host.output_error import output_error
 from host.propagate import free_run, inputs_of
 from host.recording import Array
-from host.valleys import with_poles_swapped
+from host.valleys import other_valleys, with_poles_swapped
 
 AT_REST = np.array([0.0, 0.0, 0.0, 20.0])
 WEAKENED_AT = 31.3  # under a large plane angle, so that the recording can tell
@@ -46,6 +47,23 @@ def test_a_lag_and_a_pole_of_pitch_may_trade_places(name: str) -> None:
         run = free_run(one.parameters, AT_REST, inputs).outputs
         np.testing.assert_allclose(run[0], true[0], atol=2e-4)
         assert np.abs(one.parameters[:6] - point.parameters[:6]).max() > 0.1
+
+
+def test_the_depth_tells_which_of_the_poles_is_the_lag() -> None:
+    structure, names = structure_of(("pitch_sensor_lag",)), frozenset({"pitch_sensor_lag"})
+    slow = np.array([*{**BASE, "a2": -5.0, "a3": -4.0}.values(), 0.0, 0.0, 0.5])
+    rows = hidden_dive(duration=60.0)
+    rows = replace(rows, speed=np.full(rows.time.size, BASE["u0"]))  # with it heave has one valley only
+    pitch, depth = free_run(slow, AT_REST, inputs_of(rows, structure)).outputs
+    rng = np.random.default_rng(1)
+    noise = np.array([[1e-3], [5e-3]]) * rng.standard_normal((2, rows.time.size))
+    fitter = Fitter([replace(rows, pitch=pitch + noise[0], depth=depth + noise[1])])
+    inputs, free = fitter.inputs(names), fitter.free(names)
+    start = Point(structure, slow, [AT_REST], np.zeros(4))
+    for swapped in with_poles_swapped(start):
+        wrong = output_error(swapped, inputs, free)
+        best = max([wrong, *other_valleys(wrong, inputs)], key=lambda fit: fit.log_likelihood)
+        assert best.parameters[-1] == pytest.approx(0.5, abs=0.05)
 
 
 def test_a_pitch_that_swings_has_no_pole_to_trade() -> None:
