@@ -1,10 +1,12 @@
 """Quantised channels tell no more than their level changes do."""
 
 import numpy as np
+import pytest
 from exact_dive import Dive, fly
 from hypothesis import given
 from hypothesis import strategies as st
 
+from host.noise_floor import noise_floor, resolution
 from host.rounding import quantum, thinned
 
 
@@ -45,3 +47,33 @@ def test_what_is_left_was_measured_and_tells_of_every_level(step_m: float, missi
     np.testing.assert_array_equal(thin.depth[left], recording.depth[left])
     known = recording.depth[np.isfinite(recording.depth)]
     assert left.sum() >= min(known.size, np.count_nonzero(np.diff(known)))
+
+
+def test_a_fast_dive_has_its_step_though_few_readings_repeat() -> None:
+    recording, _ = fly(Dive(duration=30.0))
+    read = 0.1 * np.round(recording.depth / 0.1)
+    assert abs(quantum([read]) - 0.1) < 1e-9
+    assert quantum([recording.depth]) < 1e-8
+    # Readings put on another clock lie between the steps, but many are repeated.
+    resampled = np.repeat(read, 10)
+    resampled[::97] += 0.037
+    assert abs(quantum([resampled]) - 0.1) < 0.07
+
+
+@pytest.mark.parametrize("depth_noise", [0.002, 0.02, 0.035])
+@pytest.mark.parametrize("amplitude", [0.005, 0.02, 0.25])
+def test_the_noise_of_rounded_readings_is_that_of_sensor_and_rounding(
+    depth_noise: float, amplitude: float
+) -> None:
+    recording, _ = fly(Dive(duration=200.0, amplitude=amplitude, depth_noise=depth_noise))
+    recording.depth[:] = 0.1 * np.round(recording.depth / 0.1)
+    found = np.sqrt(noise_floor([recording])[1])
+    both = np.hypot(depth_noise, 0.1 / 12**0.5)
+    assert 0.8 * both < found < 1.35 * both
+    assert resolution([recording])[1] == pytest.approx(0.1)
+
+
+def test_noise_above_the_steps_rules_them() -> None:
+    recording, _ = fly(Dive(duration=60.0, depth_noise=0.1))
+    recording.depth[:] = 0.05 * np.round(recording.depth / 0.05)
+    assert resolution([recording])[1] == 0.0
