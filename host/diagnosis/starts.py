@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
 
 FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
-FEW = 2  # members of a set, the free trim among them, that lacks the most
+FEW = 1  # members of a set, the free trim among them, that lacks the most
 # 1/s, of a1: a base that lacks an effect may follow its plane at once, or hardly at all.
 INSTANT, USUAL_DAMPING, IDLE = -10.0, -1.0, -0.1
 A1, B1 = NAMES.index("a1"), NAMES.index("b1")
@@ -36,16 +36,15 @@ def starts_of(
     likely = sorted(probed(fitter, parent, named(name), values), key=lambda pair: -pair[0])
     names = parent.names | {name}
     starts = [fitter.point(names, parent, name, probe) for _, probe in likely[:2]]
+    if rival is not None:
+        probes = [probe for _, probe in likely[:2]] + _same_size(fitter, rival, parent, name)
+        return starts + [fitter.point(names, rival, name, probe) for probe in probes]
     guesses = [guess(fitter, starts[0], names)] if may_be_bent(fitter, parent) else []
     if is_far(fitter, parent):
         del starts[1:]
     if not INSTANT < parent.fit.parameters[A1] < IDLE:
         starts += [_with_usual_heave(start) for start in starts]
-    starts += guesses
-    if rival is not None:
-        probes = [probe for _, probe in likely[:2]] + _same_size(fitter, rival, parent, name)
-        starts += [fitter.point(names, rival, name, probe) for probe in probes]
-    return starts
+    return starts + guesses
 
 
 def idle(start: Point, name: str) -> Point:
