@@ -57,7 +57,8 @@ def fit_maximum_likelihood(
         held["u0"] = float(np.mean([r.speed.mean() for r in recordings]))
     free = np.array([name not in held for name in structure.names])
     steps = resolution(recordings)
-    inputs = [inputs_of(recording, structure, steps=steps) for recording in recordings]
+    told = thinned(recordings, steps)
+    inputs = [inputs_of(recording, structure, steps=steps) for recording in told]
     if starts is None:
         own = [value for effect in structure.effects for value in effect.probes[0]]
         starts = [(np.concatenate([base, own]), initial) for base, initial in start_values(recordings)]

@@ -1,9 +1,10 @@
 """The sensors' own noise, from the recording alone: below it there is nothing left to explain."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from host.recording import Array, Recording
-from host.rounding import quantum
+from host.rounding import lattice, quantum
 
 FINEST = np.array([1e-5, 1e-4])  # rad, m; finer steps matter to no model
 RULES = 0.25  # of a channel's noise variance; where rounding is less, it is as good as normal
@@ -21,11 +22,15 @@ def noise_floor(recordings: list[Recording]) -> Array:
 
 
 def resolution(recordings: list[Recording]) -> Array:
-    """The steps (2,) in which pitch (rad) and depth (m) are told, 0 where noise rules their rounding."""
-    steps, noise = np.empty(2), np.empty(2)
-    for i, pieces in enumerate(([r.pitch for r in recordings], [r.depth for r in recordings])):
-        steps[i], noise[i] = quantum(pieces), _channel(pieces)
-    return np.where((steps**2 / 12.0 > RULES * noise) & (steps > FINEST), steps, 0.0)
+    """The steps (2,) to which pitch (rad) and depth (m) are rounded, 0 where noise rules."""
+    steps = np.array([lattice([r.pitch for r in recordings]), lattice([r.depth for r in recordings])])
+    return np.where((steps**2 / 12.0 > RULES * noise_floor(recordings)) & (steps > FINEST), steps, 0.0)
+
+
+def is_quantised(recordings: list[Recording]) -> NDArray[np.bool_]:
+    """Whether pitch, depth (2,) are told in steps that rule their noise, held and resampled ones as well."""
+    steps = np.array([quantum([r.pitch for r in recordings]), quantum([r.depth for r in recordings])])
+    return np.asarray(steps**2 / 12.0 > RULES * noise_floor(recordings))
 
 
 def _channel(pieces: list[Array]) -> float:

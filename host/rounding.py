@@ -7,32 +7,45 @@ import numpy as np
 from host.recording import Array, Recording
 
 OFF_LATTICE = 0.01  # of a step, to which readings are written
+NO_STEPS = np.zeros(2)
 
 
-def quantum(pieces: list[Array]) -> float:
-    """The step of a quantised channel, that of its readings' lattice; 0 where they lie on none.
-
-    Readings resampled between the steps lie on none, but repeat: there it is the usual distance of two.
-    """
-    values = np.concatenate([piece[np.isfinite(piece)] for piece in pieces])
-    levels = np.unique(np.round(values, 9))
+def lattice(pieces: list[Array]) -> float:
+    """The step of which all readings of a channel are multiples, from one of them; 0 where there is none."""
+    levels = _levels(pieces)
     if levels.size < 2:
         return 0.0
     steps = np.diff(levels)
-    if np.allclose(steps / steps.min(), np.round(steps / steps.min()), atol=OFF_LATTICE):
-        return float(steps.min())
-    return float(np.median(steps)) if levels.size <= values.size / 3 else 0.0
+    counts = steps / steps.min()
+    return float(steps.min()) if np.allclose(counts, np.round(counts), atol=OFF_LATTICE) else 0.0
 
 
-def thinned(recordings: list[Recording]) -> list[Recording]:
-    """The recordings with as many values of a quantised channel as its level changes tell.
+def quantum(pieces: list[Array]) -> float:
+    """The step of a quantised channel; 0 where hardly any reading repeats.
 
-    For estimators that take errors for normal and independent. While a value stays the same its rounding
-    error is one error, not as many as there are rows, nor two. A channel whose noise makes it change level
-    all the time, or that has no steps, stays whole.
+    Readings held for some rows, or resampled between their steps, are on no lattice, but repeat: there it is
+    the usual distance of two.
     """
-    depth = _thinned([r.depth for r in recordings])
-    pitch = _thinned([r.pitch for r in recordings])
+    step, levels = lattice(pieces), _levels(pieces)
+    if step > 0.0 or levels.size < 2:
+        return step
+    readings = sum(int(np.isfinite(piece).sum()) for piece in pieces)
+    return float(np.median(np.diff(levels))) if levels.size <= readings / 3 else 0.0
+
+
+def _levels(pieces: list[Array]) -> Array:
+    return np.unique(np.round(np.concatenate([piece[np.isfinite(piece)] for piece in pieces]), 9))
+
+
+def thinned(recordings: list[Recording], steps: Array = NO_STEPS) -> list[Recording]:
+    """The recordings with as many readings of pitch and depth as their changes tell.
+
+    While a reading stays the same its error is one error, not as many as there are rows, nor two. A channel
+    that changes all the time stays whole, and so does one with steps (2,), whose likelihood is that of
+    intervals and knows.
+    """
+    channels = [r.pitch for r in recordings], [r.depth for r in recordings]
+    pitch, depth = (p if step > 0.0 else _thinned(p) for p, step in zip(channels, steps, strict=True))
     return [replace(r, depth=d, pitch=p) for r, d, p in zip(recordings, depth, pitch, strict=True)]
 
 

@@ -42,14 +42,16 @@ class Fitter:
     """All that the fits of one diagnosis share: recordings, noise floor, what is held, where fits start.
 
     known    an explanation of other stretches of the same vehicle; without one the base model is fitted
+    steps    (2,) of rounding, where it rules pitch and depth
     thinned  the recordings for what takes errors for normal
     """
 
     def __init__(self, recordings: list[Recording], known: Explanation | None = None) -> None:
         self.floor = noise_floor(recordings)
         self.recordings = recordings
+        self.steps = resolution(recordings)
         self.thinned = thinned(recordings)
-        self._steps = resolution(recordings)
+        self._told = thinned(recordings, self.steps)
         self.accelerations = accelerations(self.thinned)
         self.held = dict(HELD)
         if recordings[0].has_speed:
@@ -123,7 +125,7 @@ class Fitter:
         Only then its likelihood compares with that of a set among random forces.
         """
         fit = explanation.fit
-        if fit.has_process_noise or not self._steps.any():
+        if fit.has_process_noise or not self.steps.any():
             return explanation
         start = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
         inputs = self.inputs(explanation.names, for_filter=True)
@@ -267,10 +269,10 @@ class Fitter:
         A filter takes errors for normal: of rounded readings it gets no more than they tell.
         """
         if (names, for_filter) not in self._inputs:
-            structure, steps = structure_of(names), None if for_filter else self._steps
+            structure, steps = structure_of(names), None if for_filter else self.steps
             self._inputs[names, for_filter] = [
                 inputs_of(recording, structure, self._longest_substep, steps)
-                for recording in (self.thinned if for_filter else self.recordings)
+                for recording in (self.thinned if for_filter else self._told)
             ]
         return self._inputs[names, for_filter]
 

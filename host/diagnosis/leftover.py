@@ -13,7 +13,7 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.equations import NAMES
 from host.fit import Fit
-from host.noise_floor import resolution
+from host.noise_floor import is_quantised
 from host.recording import Array, Recording
 from host.whiteness import correlation_factor, is_white
 
@@ -61,11 +61,12 @@ def leftover(fitter: Fitter, best: Explanation) -> Leftover:
     tells of the motion.
     """
     fit = best.fit
-    rounded = resolution(fitter.recordings) > 0.0
+    rounded = is_quantised(fitter.recordings)
     counts = np.sum([np.isfinite(e).sum(axis=1) for e in fit.whitened], axis=0)
     doubt = np.where(rounded, ROUNDING_DOUBT, np.maximum(FLOOR_DOUBT, 1.0 + FLOOR_SPREAD / np.sqrt(counts)))
     even = [e[~rounded] for e in fit.whitened]
-    innovations = even if fit.has_process_noise else fit.whitened
+    by_intervals = (fitter.steps > 0.0) & (not fit.has_process_noise)
+    innovations = [e[~rounded | by_intervals] for e in fit.whitened]
     gain = fitter.gain(best, ANY_SMOOTH_FORCE.name, [], is_thorough=True) / correlation_factor(fit.whitened)
     terms = len(ANY_SMOOTH_FORCE.parameters)
     return Leftover(

@@ -87,12 +87,10 @@ def _whitened(
             white = whitened_innovations(point, inputs)
         else:
             white, deviance = residuals_at(point, inputs)
-            return white, np.inf if _runs_away(white) else deviance
-        return white, np.inf if _runs_away(white) else sum(float(np.sum(e**2)) for e, _ in white)
-
-
-def _runs_away(white: list[tuple[Array, Array]]) -> bool:
-    return not all(np.abs(S).max() < RUNAWAY for _, S in white)
+        if parent.fit.has_process_noise:
+            deviance = sum(float(np.sum(e**2)) for e, _ in white)
+        runs_away = not all(np.abs(S).max() < RUNAWAY for _, S in white)
+        return white, np.inf if runs_away else deviance
 
 
 def _probes(fitter: "Fitter", effect: Effect, parent: Explanation) -> list[Array]:

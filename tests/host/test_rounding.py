@@ -6,8 +6,9 @@ from exact_dive import Dive, fly
 from hypothesis import given
 from hypothesis import strategies as st
 
+from host.maximum_likelihood import fit_maximum_likelihood
 from host.noise_floor import noise_floor, resolution
-from host.rounding import quantum, thinned
+from host.rounding import lattice, quantum, thinned
 
 
 def quantised(step_m: float, duration: float = 60.0):  # type: ignore[no-untyped-def]
@@ -54,10 +55,20 @@ def test_a_fast_dive_has_its_step_though_few_readings_repeat() -> None:
     read = 0.1 * np.round(recording.depth / 0.1)
     assert abs(quantum([read]) - 0.1) < 1e-9
     assert quantum([recording.depth]) < 1e-8
-    # Readings put on another clock lie between the steps, but many are repeated.
-    resampled = np.repeat(read, 10)
-    resampled[::97] += 0.037
-    assert abs(quantum([resampled]) - 0.1) < 0.07
+
+
+def test_what_is_held_or_resampled_is_no_rounding_but_is_told_once() -> None:
+    recording, _ = fly(Dive(duration=60.0))
+    recording.depth[:] = np.repeat(recording.depth[::5], 5)
+    assert lattice([recording.depth]) == 0.0
+    assert resolution([recording])[1] == 0.0
+    fit = fit_maximum_likelihood([recording], noise_model="output_error")
+    assert fit.samples == recording.time.size + recording.depth[::5].size
+    # Rounded readings put on another clock lie between the steps here and there.
+    recording.depth[:] = np.repeat(0.1 * np.round(recording.depth[::5] / 0.1), 5)
+    recording.depth[::97] += 0.037
+    assert resolution([recording])[1] == 0.0
+    assert quantum([recording.depth]) > 0.01
 
 
 @pytest.mark.parametrize("depth_noise", [0.002, 0.02, 0.035])
