@@ -62,15 +62,10 @@ class GaussNewton:
 
     def predicted_cost(self, cost: float) -> float:
         """Deviance, of `cost` here, after the full step if the equations were linear."""
-        count = self.g.size
-        reduced, rhs, left = self.information(), self.g.copy(), cost
-        for Hpx, Hxx, gx in self.own:
-            step = np.linalg.solve(Hxx, gx)
-            rhs -= Hpx @ step
-            left -= float(gx @ step)
-        scale = np.sqrt(np.maximum(np.diag(self.H), 1e-300))
-        normal = reduced / np.outer(scale, scale) + 1e-9 * np.eye(count)
-        return left - float((rhs / scale) @ np.linalg.solve(normal, rhs / scale))
+        reduced, rhs = self._reduced()
+        left = cost - sum(float(gx @ np.linalg.solve(Hxx, gx)) for _, Hxx, gx in self.own)
+        step = self._step(reduced, rhs, damping=1e-9)
+        return left - float(step @ (2.0 * rhs - reduced @ step))
 
     def information(self) -> Array:
         """Fisher information of the free parameters alone."""
@@ -89,25 +84,46 @@ class GaussNewton:
 
     def trial(self, damping: float) -> Point:
         """The point one damped step on (Levenberg-Marquardt), inside the parameters' bounds."""
-        reduced, rhs = self.information(), self.g.copy()
-        for Hpx, Hxx, gx in self.own:
-            rhs -= Hpx @ np.linalg.solve(Hxx, gx)
-        scale = np.sqrt(np.maximum(np.diag(self.H), 1e-300))
-        normal = reduced / np.outer(scale, scale) + damping * np.eye(scale.size)
-        if not np.isfinite(normal).all():
+        reduced, rhs = self._reduced()
+        if not np.isfinite(reduced).all():
             return self.point  # the model has run away: no step is better than none
-        try:
-            delta = cho_solve(cho_factor(normal), rhs / scale) / scale
-        except np.linalg.LinAlgError:
-            delta = np.linalg.lstsq(normal, rhs / scale, rcond=1e-12)[0] / scale
-        bounds = self.point.structure.parameters
-        lower = np.array([p.lower for p in bounds])[self.free]
-        upper = np.array([p.upper for p in bounds])[self.free]
+        moved = self._step(reduced, rhs, damping)
         parameters = self.point.parameters.copy()
-        parameters[self.free] = np.clip(parameters[self.free] + delta, lower, upper)
-        moved = parameters[self.free] - self.point.parameters[self.free]
+        parameters[self.free] += moved
         initial = [
             x0 + np.linalg.solve(Hxx * (1.0 + damping * np.eye(NX0)), gx - Hpx.T @ moved)
             for x0, (Hpx, Hxx, gx) in zip(self.point.initial, self.own, strict=True)
         ]
         return replace(self.point, parameters=parameters, initial=initial)
+
+    def _reduced(self) -> tuple[Array, Array]:
+        """Normal matrix and right-hand side of the free parameters, the initial states eliminated."""
+        rhs = self.g.copy()
+        for Hpx, Hxx, gx in self.own:
+            rhs -= Hpx @ np.linalg.solve(Hxx, gx)
+        return self.information(), rhs
+
+    def _step(self, reduced: Array, rhs: Array, damping: float) -> Array:
+        """The damped step; what would leave its bounds stops there, and the others step to suit that."""
+        scale = np.sqrt(np.maximum(np.diag(self.H), 1e-300))
+        normal = reduced / np.outer(scale, scale) + damping * np.eye(scale.size)
+        bounds, here = self.point.structure.parameters, self.point.parameters
+        lower = (np.array([p.lower for p in bounds]) - here)[self.free]
+        upper = (np.array([p.upper for p in bounds]) - here)[self.free]
+        step, inside = np.zeros(scale.size), np.ones(scale.size, dtype=bool)
+        while inside.any():
+            left = rhs / scale - normal[:, ~inside] @ (step * scale)[~inside]
+            step[inside] = _solve(normal[np.ix_(inside, inside)], left[inside]) / scale[inside]
+            leaving = inside & ((step < lower) | (step > upper))
+            if not leaving.any():
+                break
+            step[leaving] = np.clip(step, lower, upper)[leaving]
+            inside &= ~leaving
+        return step
+
+
+def _solve(normal: Array, rhs: Array) -> Array:
+    try:
+        return np.asarray(cho_solve(cho_factor(normal), rhs))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.lstsq(normal, rhs, rcond=1e-12)[0])

@@ -1,4 +1,4 @@
-"""Other valleys of the likelihood: heave damping and speed trade places, or a lag and a pole of pitch.
+"""Other valleys of the likelihood: heave damping and speed trade places, or a pole of pitch and another.
 
 Depth follows from the plane by
 
@@ -7,7 +7,8 @@ Depth follows from the plane by
 A pole a1 that nearly cancels a zero can sit at another zero nearly as well, with another u0 and b1: where the
 speed is not measured, one recording may have two maxima with different heave. A search ends in that in which
 it began; so the profile of the likelihood over a1 is walked on both sides, and every dip is entered. A lag in
-series with the pitch is one pole more: which of the poles is the lag's, pitch alone does not say.
+series with the pitch is one pole more, and so is heave where it turns the hull: which of the poles is whose,
+pitch alone does not say.
 """
 
 from dataclasses import replace
@@ -20,16 +21,19 @@ from host.fit import Fit, Rival
 from host.gauss_newton import Point
 from host.output_error import output_error
 from host.propagate import Inputs
+from host.recording import Array
 from host.whiteness import correlation_factor
 
 STRIDES = (0.12, 0.3, 0.55, 1.8, 3.3, 8.0)  # times a1
 FEW_ITERATIONS, ROUGHLY = 6, 0.3
 WORTH_ENTERING = 40.0  # of a log-likelihood below the best, that a point of the profile may lie
 ALMOST_AS_LIKELY = 3.0  # of a log-likelihood: odds of 20 to 1 and less rule nothing out
+NEARLY_REAL = 0.3  # of its real part, the imaginary part of a pole that may be two
 APART = 4.0  # standard deviations between two modes
 USUAL_SPEED, SPEED_FACTOR = 1.5, 3.0  # m/s; gliders make 0.3, torpedoes 10
 A1, A2, A3, B1, B2, U0 = (NAMES.index(name) for name in ("a1", "a2", "a3", "b1", "b2", "u0"))
-LAGS = ("lag_time", "pitch_lag_time")
+LAGS, MUNK = ("lag_time", "pitch_lag_time"), "c_qw"
+SHARING_POLES = (*LAGS, MUNK)  # parameters of effects that bring a pole like those of pitch
 
 
 def other_valleys(fit: Fit, inputs: list[Inputs]) -> list[Fit]:
@@ -56,25 +60,36 @@ def other_valleys(fit: Fit, inputs: list[Inputs]) -> list[Fit]:
 
 
 def with_poles_swapped(point: Point) -> list[Point]:
-    """The point with a lag in series and a real pole of pitch in each other's place, the gain as it was.
+    """The point with a real pole of pitch in the place of a lag's or of heave's, and the other way round.
 
-    Their product is the same to the sensor of pitch; only depth, or the plane's own motion, tells them apart.
+    A lag in series keeps the gain: the product of both is the same to the sensor of pitch. Where heave turns
+    the hull (Munk), pitch follows from the plane by [b2 (s - a1) + c_qw b1] / [(s - a1) (s^2 - a2 s - a3)],
+    and c_qw makes up for another a1. Only depth, or the plane's own motion, tells these apart.
     """
     names, values = list(point.structure.names), point.parameters
-    a2, a3, b2 = values[[A2, A3, B2]]
+    a1, a2, a3, b1, b2 = values[[A1, A2, A3, B1, B2]]
     poles = np.roots([1.0, -a2, -a3])
+    if np.abs(poles.imag).max() > NEARLY_REAL * np.abs(poles.real).max() or poles.real.max() >= 0.0:
+        return []
     swapped = []
-    for lag in (names.index(name) for name in LAGS if name in names):
-        if np.iscomplex(poles).any() or poles.real.max() >= 0.0:
-            break
-        for pole, other in (poles.real, poles.real[::-1]):
-            moved = values.copy()
+    for pole, stays in (poles.real, poles.real[::-1]):
+        for lag in (names.index(name) for name in LAGS if name in names):
+            moved = _with_pitch_poles(values, stays, -1.0 / values[lag])
             moved[lag] = -1.0 / pole
-            stays, comes = other, -1.0 / values[lag]
-            moved[[A2, A3]] = stays + comes, -stays * comes
             moved[B2] = b2 * moved[A3] / a3
-            swapped.append(replace(point, parameters=point.structure.clipped(moved)))
-    return swapped
+            swapped.append(moved)
+        if MUNK in names and a1 < 0.0 and b1 != 0.0:
+            moved = _with_pitch_poles(values, stays, a1)
+            moved[A1] = pole
+            moved[names.index(MUNK)] += b2 * (pole - a1) / b1
+            swapped.append(moved)
+    return [replace(point, parameters=point.structure.clipped(moved)) for moved in swapped]
+
+
+def _with_pitch_poles(values: Array, one: float, other: float) -> Array:
+    moved = values.copy()
+    moved[[A2, A3]] = one + other, -one * other
+    return moved
 
 
 def plausibility(fit: Fit) -> float:

@@ -143,14 +143,14 @@ EFFECTS = (
         slot="actuator",
         parameters=(
             Parameter(name="stall_angle", unit="rad", lower=0.01, upper=1.5, meaning="where lift breaks"),
-            Parameter(name="stall_loss", unit="1", lower=0, upper=3, meaning="1: flat, more: falling lift"),
+            Parameter(name="stall_loss", unit="1", lower=0.5, upper=3, meaning="1: flat, more: falling lift"),
         ),
         sentence="Beyond an angle the plane stalls: its lift no longer grows.",
         equation="acting angle = delta - stall_loss (|delta| - stall_angle)+ sign(delta)",
         manoeuvre="plane steps of increasing size beyond the stall angle",
         probes=((0.2, 1.2), (0.45, 1.3), (0.75, 1.6)),
         scales=("rudder", ""),
-        sizes=("stall_loss",),
+        sizes=(),
         plane=_stall,
     ),
     Effect(

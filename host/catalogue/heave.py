@@ -63,7 +63,7 @@ EFFECTS = (
     Effect(
         name="heave_quadratic_drag",
         slot="heave",
-        parameters=(Parameter(name="c_ww", unit="1/m", lower=-50, upper=5, meaning="cross-flow drag"),),
+        parameters=(Parameter(name="c_ww", unit="1/m", lower=-50, upper=0, meaning="cross-flow drag"),),
         sentence="Cross-flow drag in heave grows with the square of the heave velocity.",
         equation="w' = ... + c_ww w |w|",
         manoeuvre="plane steps of several sizes, the largest held for five heave time constants",

@@ -15,7 +15,7 @@ EFFECTS = (
         name="large_angle_kinematics",
         slot="kinematics",
         parameters=(
-            Parameter(name="kinematics_share", unit="1", lower=-1, upper=4, meaning="1 is the full geometry"),
+            Parameter(name="kinematics_share", unit="1", lower=0, upper=2, meaning="1 is the full geometry"),
         ),
         sentence="At large pitch the depth rate is w cos(theta) - u sin(theta), not w - u theta.",
         equation="zeta' = (1 - k)(w - u theta) + k (w cos theta - u sin theta), k = kinematics_share",

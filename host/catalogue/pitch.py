@@ -30,7 +30,7 @@ EFFECTS = (
     Effect(
         name="pitch_quadratic_damping",
         slot="pitch",
-        parameters=(Parameter(name="c_qq", unit="1/rad", lower=-200, upper=20, meaning="quadratic damping"),),
+        parameters=(Parameter(name="c_qq", unit="1/rad", lower=-200, upper=0, meaning="quadratic damping"),),
         sentence="Damping in pitch grows with the square of the pitch rate.",
         equation="q' = ... + c_qq q |q|",
         manoeuvre="quick plane reversals of several sizes",
@@ -66,7 +66,7 @@ EFFECTS = (
         name="large_angle_restoring",
         slot="pitch",
         parameters=(
-            Parameter(name="restoring_share", unit="1", lower=-1, upper=4, meaning="1 is the full sine"),
+            Parameter(name="restoring_share", unit="1", lower=0, upper=2, meaning="1 is the full sine"),
         ),
         sentence="At large pitch the restoring moment follows the sine of the angle, not the angle.",
         equation="q' = a2 q + a3 [theta + restoring_share (sin theta - theta)] + ...",

@@ -23,8 +23,8 @@ EFFECTS = (
             Parameter(
                 name="speed_time", unit="s", lower=0.3, upper=1000, meaning="recovery time of the speed"
             ),
-            Parameter(name="c_ud", unit="m/s^2/rad^2", lower=-100, upper=500, meaning="drag of the plane"),
-            Parameter(name="c_uq", unit="1", lower=-10, upper=20, meaning="heave and turning into surge"),
+            Parameter(name="c_ud", unit="m/s^2/rad^2", lower=0, upper=500, meaning="drag of the plane"),
+            Parameter(name="c_uq", unit="1", lower=0, upper=20, meaning="heave and turning into surge"),
         ),
         sentence="The speed falls in manoeuvres: damping falls with it, the plane's force with its square.",
         equation="u' = -(u^2 - u0^2)/(2 u0 speed_time) - c_ud (u/u0)^2 delta^2 - c_uq w q; "

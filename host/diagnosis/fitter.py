@@ -25,7 +25,14 @@ from host.output_error import annealed, free_run_cost, output_error
 from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
 from host.recording import Array, Recording
 from host.rounding import thinned
-from host.valleys import LAGS, log_prior, other_valleys, plausibility, with_poles_swapped, with_rivals
+from host.valleys import (
+    SHARING_POLES,
+    log_prior,
+    other_valleys,
+    plausibility,
+    with_poles_swapped,
+    with_rivals,
+)
 from host.wave_forces import wave_forces, wave_forces_from
 
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
@@ -170,7 +177,9 @@ class Fitter:
         """
         starts = starts_of(self, parent, name, values, rival)
         fit, is_white = self._fit(starts), not parent.fit.has_process_noise
-        if is_white and named(name).parameters[0].name in LAGS:
+        brings_pole = named(name).parameters[0].name in SHARING_POLES
+        is_idle = fit.log_likelihood < parent.fit.log_likelihood + ROUGHLY
+        if is_white and (brings_pole or is_idle):
             end = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
             fit = self._fit([end, *with_poles_swapped(end)])
         if is_white and named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:

@@ -24,7 +24,7 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
     Either must pay as any effect does.
     """
     search.on_progress("physics outside the catalogue")
-    for _ in range(MOST_ROUNDS if search.part is None else 1):
+    for _ in range(1 if search.part is not None and _is_large(best) else MOST_ROUNDS):
         grown = _grown(search, best)
         # Of a large set each member costs a long fit to try without: that waits until all have joined.
         leaner = grown if _is_large(best) else map(search.pruned, grown)
@@ -62,7 +62,8 @@ def _is_large(explanation: Explanation) -> bool:
 def _grown(search: Search, best: Explanation) -> list[Explanation]:
     """The set with a form more, beside all its members or in the place of one: the two best.
 
-    A large set with another effect more, too; in the place of one of its many members a form says little.
+    A large set with another effect more, too, and so any whose search saw an excerpt only. In the place of
+    one of many members a form says little.
     """
     parents = [best]
     if not _is_large(best):
@@ -75,8 +76,8 @@ def _grown(search: Search, best: Explanation) -> list[Explanation]:
         likely = sorted((name for name in gains if gains[name] > least), key=lambda name: -gains[name])
         for name in likely[: PROMISING if len(best.names) <= SMALL else 1]:
             chosen[parent.names | {name}] = parent, name
-    if len(known_in(best)) >= LARGEST_SET:
-        gains = search.gains(best, is_thorough=False)
+    if len(known_in(best)) >= LARGEST_SET or search.part is not None:
+        gains = search.gains(best, is_thorough=not _is_large(best))
         for name in sorted(gains, key=lambda name: -gains[name])[:FEW]:
             if gains[name] > margin(best):
                 chosen[best.names | {name}] = best, name

@@ -49,6 +49,20 @@ def test_a_lag_and_a_pole_of_pitch_may_trade_places(name: str) -> None:
         assert np.abs(one.parameters[:6] - point.parameters[:6]).max() > 0.1
 
 
+def test_heave_that_turns_the_hull_and_a_pole_of_pitch_may_trade_places() -> None:
+    rows, structure = hidden_dive(duration=30.0), structure_of(("munk_moment",))
+    slow = {**BASE, "a1": -0.7, "a2": -5.0, "a3": -4.0}  # poles of pitch at -1 and -4 1/s
+    point = Point(structure, np.array([*slow.values(), 0.0, 0.0, 0.0]), [AT_REST], np.zeros(4))
+    inputs = inputs_of(rows, structure)
+    true = free_run(point.parameters, AT_REST, inputs).outputs
+    swapped = with_poles_swapped(point)
+    assert sorted(one.parameters[0] for one in swapped) == pytest.approx([-4.0, -1.0])
+    for one in swapped:
+        run = free_run(one.parameters, AT_REST, inputs).outputs
+        np.testing.assert_allclose(run[0], true[0], atol=2e-4)
+        assert np.abs(run[1] - true[1]).max() > 0.01
+
+
 def test_the_depth_tells_which_of_the_poles_is_the_lag() -> None:
     structure, names = structure_of(("pitch_sensor_lag",)), frozenset({"pitch_sensor_lag"})
     slow = np.array([*{**BASE, "a2": -5.0, "a3": -4.0}.values(), 0.0, 0.0, 0.5])

@@ -1,0 +1,58 @@
+"""One Gauss-Newton step: what it predicts, and how it keeps within the bounds of the parameters."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import lsq_linear
+
+from host.catalogue import structure_of
+from host.gauss_newton import GaussNewton, Point
+
+STRUCTURE = structure_of(("heave_quadratic_drag", "large_angle_kinematics"))
+NAMES = list(STRUCTURE.names)
+FREE = np.array([name in ("a1", "c_ww", "kinematics_share") for name in NAMES])
+DRAG, SHARE = NAMES.index("c_ww"), NAMES.index("kinematics_share")
+
+
+def linear_problem(seed: int, drag: float, share: float) -> tuple[GaussNewton, np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+    """Normal equations of white innovations e = S d, with their sensitivities to the free parameters."""
+    rng = np.random.default_rng(seed)
+    scores = np.zeros((2, len(NAMES) + 4, 200))
+    scores[:, : len(NAMES)][:, FREE] = rng.standard_normal((2, 3, 200)) + 0.5 * rng.standard_normal((2, 1, 200))
+    wanted = rng.standard_normal(3) * np.array([0.3, 1.0, 1.0])
+    S = scores[:, : len(NAMES)][:, FREE].transpose(1, 0, 2).reshape(3, -1)
+    error = (S.T @ wanted).reshape(2, 200) + 0.01 * rng.standard_normal((2, 200))
+    values = np.zeros(len(NAMES))
+    values[NAMES.index("a1")], values[DRAG], values[SHARE] = -1.0, drag, share
+    point = Point(STRUCTURE, values, [np.zeros(4)], np.array([1.0, 1.0, 0.0, 0.0]))
+    return GaussNewton([(error, scores)], point, FREE), S.T, error.ravel()
+
+
+@given(st.integers(0, 10_000), st.floats(-2.0, 0.0), st.floats(0.0, 2.0))
+def test_a_step_is_the_best_within_its_bounds(seed: int, drag: float, share: float) -> None:
+    problem, S, error = linear_problem(seed, drag, share)
+    bounds = [p for p, is_free in zip(STRUCTURE.parameters, FREE, strict=True) if is_free]
+    here = problem.point.parameters[FREE]
+    box = np.array([p.lower for p in bounds]) - here, np.array([p.upper for p in bounds]) - here
+    box = box[0] - 1e-12, box[1] + 1e-12
+    best = lsq_linear(S, error, bounds=box).x
+    moved = problem.trial(0.0).parameters[FREE] - here
+    assert (moved >= box[0]).all() and (moved <= box[1]).all()
+    least, reached = (float(np.sum((error - S @ step) ** 2)) for step in (best, moved))
+    # What has once met its bound stays there for this step; on these problems that costs hardly anything.
+    assert reached <= 1.15 * least + 1.0
+    assert problem.predicted_cost(float(error @ error)) == pytest.approx(reached, rel=1e-6)
+
+
+def test_the_others_make_up_for_what_stops_at_its_bound() -> None:
+    """Clipping the whole step afterwards would leave them where they suit a drag that drives the vehicle."""
+    for seed in range(200):
+        problem, S, error = linear_problem(seed, drag=0.0, share=1.0)
+        whole = np.linalg.lstsq(S, error, rcond=None)[0]
+        if whole[1] > 0.5:
+            break
+    moved = problem.trial(0.0).parameters[FREE] - problem.point.parameters[FREE]
+    clipped = np.array([whole[0], 0.0, np.clip(whole[2], -1.0, 1.0)])
+    assert moved[1] == 0.0
+    assert np.sum((error - S @ moved) ** 2) < np.sum((error - S @ clipped) ** 2)
