@@ -14,7 +14,7 @@ from host.diagnosis.absence import one_step_without
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations
 from host.diagnosis.prospects import form_gains, gain
-from host.diagnosis.starts import guess, idle, is_far, starts_of
+from host.diagnosis.starts import guess, has_usual_heave, idle, is_far, starts_of, with_usual_heave
 from host.equations import NAMES
 from host.filter_error import filter_error, filter_error_from
 from host.fit import Fit
@@ -179,9 +179,12 @@ class Fitter:
         fit, is_white = self._fit(starts), not parent.fit.has_process_noise
         brings_pole = named(name).parameters[0].name in SHARING_POLES
         is_idle = fit.log_likelihood < parent.fit.log_likelihood + ROUGHLY
-        if is_white and (brings_pole or is_idle):
-            end = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
-            fit = self._fit([end, *with_poles_swapped(end)])
+        end = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+        others = with_poles_swapped(end) if brings_pole or is_idle else []
+        if not has_usual_heave(end):
+            others.append(with_usual_heave(end))
+        if is_white:
+            fit = max([fit, *(self._fit([start]) for start in others)], key=plausibility)
         if is_white and named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
             fit = self._fit([idle(starts[0], name)])
         return self._explained(parent.names | {name}, fit)

@@ -42,8 +42,8 @@ def starts_of(
     guesses = [guess(fitter, starts[0], names)] if may_be_bent(fitter, parent) else []
     if is_far(fitter, parent):
         del starts[1:]
-    if not INSTANT < parent.fit.parameters[A1] < IDLE:
-        starts += [_with_usual_heave(start) for start in starts]
+    if not has_usual_heave(starts[0]):
+        starts += [with_usual_heave(start) for start in starts]
     return starts + guesses
 
 
@@ -73,7 +73,12 @@ def guess(fitter: "Fitter", start: Point, names: Names) -> Point:
     return annealed(point, fitter.inputs(names, for_filter=True), fitter.free(names), fitter.accelerations)
 
 
-def _with_usual_heave(start: Point) -> Point:
+def has_usual_heave(point: Point) -> bool:
+    """Whether heave neither follows the plane at once nor hardly moves."""
+    return bool(INSTANT < point.parameters[A1] < IDLE)
+
+
+def with_usual_heave(start: Point) -> Point:
     """A start with the heave damping of a usual vehicle; if it was fast, with the same steady velocity."""
     parameters = start.parameters.copy()
     parameters[B1] *= USUAL_DAMPING / parameters[A1] if parameters[A1] < INSTANT else 0.0
