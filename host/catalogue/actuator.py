@@ -70,7 +70,7 @@ EFFECTS = (
         sentence="The plane's zero is off: the commanded angle and the acting one differ by a constant.",
         equation="delta = command + rudder_zero",
         manoeuvre="level flight with the planes at zero at two speeds",
-        probes=((0.01,),),
+        probes=((0.0,),),
         command=_offset,
     ),
     Effect(

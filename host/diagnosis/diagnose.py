@@ -154,9 +154,10 @@ def _explain(
         left = leftover(fitter, best)
     may_be_sea = part is None or part.best.fit.has_process_noise
     if may_be_sea and (unknown_in(best) or not left.is_nothing):
+        calm = best
         search, best = in_a_sea(search, best)
         if part is None or part.waves is not None:
-            search, best, waves = among_waves(search, best)
+            search, best, waves = among_waves(search, best, calm)
         left = leftover(fitter, best if waves is None else waves.fitted)
     return Explained(best, search, left, waves)
 

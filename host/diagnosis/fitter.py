@@ -210,6 +210,10 @@ class Fitter:
             starts.append(guess(self, start, names))
         return self._explained(names, self._fit(starts))
 
+    def reduced(self, explanation: Explanation, names: Names) -> Explanation:
+        """The set with these members only."""
+        return self._explained(names, self._carried_on(self.point(names, explanation)))
+
     def polished(self, explanation: Explanation, tolerance: float = SETTLED) -> Explanation:
         """The same set, its fit carried on until next to nothing more is gained."""
         fit = explanation.fit

@@ -267,9 +267,9 @@ class Search:
         return best
 
     def _has_idle_member(self, explanation: Explanation) -> bool:
-        """Whether a smaller set does as well."""
+        """Whether a smaller set does better; if as well only, the free trim may do a part of the work."""
         return any(
-            self.root.names <= names < explanation.names and smaller.bic < explanation.bic + NAMING_MARGIN
+            self.root.names <= names < explanation.names and smaller.bic < explanation.bic
             for names, smaller in self.tried.items()
         )
 

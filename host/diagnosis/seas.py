@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from host.catalogue import BY_NAME
 from host.catalogue.environment import WAVE_PERIODS
 from host.catalogue.unknown import SWINGING_MOMENT
 from host.diagnosis.explanation import Explanation
@@ -43,11 +44,14 @@ def in_a_sea(calm: Search, best: Explanation) -> tuple[Search, Explanation]:
     return (rough, found) if found.bic < least else (calm, best)
 
 
-def among_waves(rough: Search, best: Explanation) -> tuple[Search, Explanation, Waves | None]:
+def among_waves(
+    rough: Search, best: Explanation, calm: Explanation
+) -> tuple[Search, Explanation, Waves | None]:
     """Where random forces that swing with a wave's period beat white ones: the search again among them.
 
     A filter that takes waves for white forces follows the measurements in the wrong band, and so hides what
-    acts beside them. While sets are compared the waves stay as they were first found.
+    acts beside them. While sets are compared the waves stay as they were first found: beside the best set,
+    or beside the named effects of that found without random forces, whichever is likelier.
     """
     fitter, swing = rough.fitter, best.names & {SWINGING_MOMENT.name, WAVES}
     if WAVES in best.names and not best.fit.has_process_noise:
@@ -60,7 +64,9 @@ def among_waves(rough: Search, best: Explanation) -> tuple[Search, Explanation, 
     for name in sorted(swing):
         plain = rough.without(plain, name)
     white = plain if plain.fit.has_process_noise else fitter.with_sea(plain)
-    first = fitter.with_waves(white)
+    named = calm.names & BY_NAME.keys() - {WAVES}
+    beside = [fitter.with_sea(fitter.reduced(calm, named))] if named - white.names else []
+    first = min((fitter.with_waves(one) for one in (white, *beside)), key=lambda e: e.bic)
     period = 2.0 * np.pi / first.fit.waves[0]
     least = fitter.as_filtered(best).bic
     if first.bic > least - NAMING_MARGIN or not WAVE_PERIODS[0] < period < WAVE_PERIODS[1]:
