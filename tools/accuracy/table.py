@@ -1,6 +1,6 @@
 """Runs methods over many dives on all cores, and prints what came out."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from multiprocessing import get_context
 
@@ -34,9 +34,8 @@ def _one(job: tuple[str, str, int]) -> tuple[Array, Array, Array, Array]:
 
 def measure(
     pairs: list[tuple[str, str]], seeds: int, workers: int, on_progress: Callable[[str], None]
-) -> list[Line]:
-    """Every pair of case and method on the same `seeds` dives of its case."""
-    lines = []
+) -> Iterator[Line]:
+    """Every pair of case and method on the same `seeds` dives of its case, each as soon as it is flown."""
     with get_context("spawn").Pool(workers) as pool:
         for case, method in pairs:
             jobs = [(case, method, FIRST_SEED + seed) for seed in range(seeds)]
@@ -48,27 +47,28 @@ def measure(
             values, stds, bounds, fits = (np.array(column) for column in zip(*answers, strict=True))
             with np.errstate(all="ignore"):
                 result = score(values, stds, bounds, CASES[case].truth)
-            lines.append(Line(case=case, method=method, score=result, fit=np.median(fits, axis=0)))
-    return lines
+            yield Line(case=case, method=method, score=result, fit=np.median(fits, axis=0))
 
 
-def show(lines: list[Line]) -> str:
-    """The table as text: one block of five rows for each line."""
-    text = [f"{'':36s}" + "".join(f"{name:>9s}" for name in NAMES)]
-    for line in lines:
-        s = line.score
-        pitch, depth = line.fit
-        text.append(
-            f"{line.case} | {line.method} | diverged {s.diverged} of {s.dives} | "
-            f"free run on another dive: pitch {pitch:.2f} %, depth {depth:.2f} %"
-        )
-        for name, row, digits in (
-            ("bias %", s.bias, 2),
-            ("deviation / Cramér-Rao bound", s.efficiency, 2),
-            ("stated / actual deviation", s.honesty, 2),
-            ("95 % intervals that hold, %", s.coverage, 1),
-        ):
-            text.append(f"    {name:32s}" + "".join(_number(value, digits) for value in row))
+def heading() -> str:
+    """The names above the columns."""
+    return f"{'':36s}" + "".join(f"{name:>9s}" for name in NAMES)
+
+
+def show(line: Line) -> str:
+    """A line of the table as text, in a block of five rows."""
+    s, (pitch, depth) = line.score, line.fit
+    text = [
+        f"{line.case} | {line.method} | diverged {s.diverged} of {s.dives} | "
+        f"free run on another dive: pitch {pitch:.2f} %, depth {depth:.2f} %"
+    ]
+    for name, row, digits in (
+        ("bias %", s.bias, 2),
+        ("deviation / Cramér-Rao bound", s.efficiency, 2),
+        ("stated / actual deviation", s.honesty, 2),
+        ("95 % intervals that hold, %", s.coverage, 1),
+    ):
+        text.append(f"    {name:32s}" + "".join(_number(value, digits) for value in row))
     return "\n".join(text)
 
 

@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
     require_bench()
     from tools.accuracy.methods import CASES, COMPARED, DRIFTING, FOLLOWING, LIVE, REGRESSIONS
     from tools.accuracy.packages import measure_packages
-    from tools.accuracy.table import measure, show
+    from tools.accuracy.table import heading, measure, show
     from tools.compare.held_out import table_of
     from tools.compare.methods import missing
 
@@ -44,12 +44,15 @@ def run(args: argparse.Namespace) -> int:
     pairs = [pair for pair in pairs if args.only in " | ".join(pair)]
     if not pairs:
         raise ConfigError(f"--only must be part of the name of a case or a method (got {args.only!r})")
+    has_diverged = False
+    print(heading())
     with progress(args.quiet) as say:
-        lines = measure(pairs, 12 if args.quick else args.seeds, args.workers, say)
+        for line in measure(pairs, 12 if args.quick else args.seeds, args.workers, say):
+            print(show(line), flush=True)
+            has_diverged |= bool(line.score.diverged) and line.method not in REGRESSIONS
         runs = measure_packages(args.dives, args.workers, say) if args.dives > 0 and not args.only else []
-    print(show(lines))
     if runs:
         print(f"\n{first}: learnt from one dive, run freely over another; medians of {args.dives} dives")
         print(table_of(runs))
         print(missing())
-    return int(any(line.score.diverged for line in lines if line.method not in REGRESSIONS))
+    return int(has_diverged)
