@@ -15,15 +15,15 @@ def _drag(c: Chain) -> None:
 
 
 def _buoyancy(c: Chain) -> None:
-    c.heave += c.p["c_w0"]
+    c.heave += c.p["c_w0"] * ca.cos(c.theta)
 
 
 def _compressibility(c: Chain) -> None:
-    c.heave += c.p["c_wz"] * (c.zeta - c.p["neutral_depth"])
+    c.heave += c.p["c_wz"] * (c.zeta - c.p["neutral_depth"]) * ca.cos(c.theta)
 
 
 def _ballast(c: Chain) -> None:
-    c.heave += c.p["c_wb"] * after(c.time, c.p["ballast_time"])
+    c.heave += c.p["c_wb"] * ca.cos(c.theta) * after(c.time, c.p["ballast_time"])
 
 
 def _acceleration(c: Chain) -> None:
@@ -78,7 +78,7 @@ EFFECTS = (
             Parameter(name="c_w0", unit="m/s^2", lower=-5, upper=5, meaning="net weight per heave mass"),
         ),
         sentence="The vehicle is not neutral: weight and buoyancy differ by a constant force.",
-        equation="w' = ... + c_w0",
+        equation="w' = ... + c_w0 cos theta",
         manoeuvre="a start from rest with the planes level, or a change of speed",
         probes=((0.0,),),
         force=_buoyancy,
@@ -94,7 +94,7 @@ EFFECTS = (
             ),
         ),
         sentence="Buoyancy changes with depth: the hull or the water is compressed.",
-        equation="w' = ... + c_wz (zeta - neutral_depth)",
+        equation="w' = ... + c_wz (zeta - neutral_depth) cos theta",
         manoeuvre="long straight runs at the shallowest and the deepest depth of the mission",
         probes=((1e-3, 1.0),),
         scales=("", "depth"),
@@ -108,7 +108,7 @@ EFFECTS = (
             Parameter(name="ballast_time", unit="s", lower=0, upper=1e6, meaning="when it happened"),
         ),
         sentence="The weight changed at one moment: ballast was dropped, or water came in.",
-        equation="w' = ... + c_wb (t > ballast_time)",
+        equation="w' = ... + c_wb cos theta (t > ballast_time)",
         manoeuvre="straight level runs before and after",
         probes=((0.0, 0.5),),
         scales=("", "duration"),

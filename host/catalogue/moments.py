@@ -30,7 +30,7 @@ def _changed(c: Chain, like: str) -> ca.SX:
 
 
 def _weigh(c: Chain) -> None:
-    c.heave += _changed(c, "ballast_change")
+    c.heave += _changed(c, "ballast_change") * ca.cos(c.theta)
 
 
 def _weaken(c: Chain) -> None:
