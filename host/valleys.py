@@ -37,26 +37,30 @@ SHARING_POLES = (*LAGS, MUNK)  # parameters of effects that bring a pole like th
 
 
 def other_valleys(fit: Fit, inputs: list[Inputs]) -> list[Fit]:
-    """Ends of output-error searches that began with lag and pole swapped, or with another heave damping.
+    """Ends of output-error searches that began with poles swapped, or with another heave damping.
 
     Among them may be a likelier one, and the one that the search began with again. Where the speed is held,
     heave damping has one valley.
     """
     here = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
-    ends = [output_error(start, inputs, fit.free) for start in with_poles_swapped(here)]
-    if not (fit.free[A1] and fit.free[U0]):
-        return ends
-    held = fit.free.copy()
-    held[A1] = False
-    for stride in STRIDES:
-        parameters = fit.parameters.copy()
-        parameters[[A1, B1]] *= stride  # the steady heave velocity stays
-        start = Point(fit.structure, fit.structure.clipped(parameters), fit.initial, fit.noise)
-        walked = output_error(start, inputs, held, FEW_ITERATIONS, ROUGHLY)
+    starts = [(start, fit.free) for start in with_poles_swapped(here)]
+    if fit.free[A1] and fit.free[U0]:
+        held = fit.free.copy()
+        held[A1] = False
+        starts += [(_with_damping(here, stride), held) for stride in STRIDES]
+    ends = []
+    for start, free in starts:
+        walked = output_error(start, inputs, free, FEW_ITERATIONS, ROUGHLY)
         if walked.log_likelihood > fit.log_likelihood - WORTH_ENTERING:
             start = Point(fit.structure, walked.parameters, walked.initial, walked.noise)
             ends.append(output_error(start, inputs, fit.free))
     return ends
+
+
+def _with_damping(point: Point, stride: float) -> Point:
+    parameters = point.parameters.copy()
+    parameters[[A1, B1]] *= stride  # the steady heave velocity stays
+    return replace(point, parameters=point.structure.clipped(parameters))
 
 
 def with_poles_swapped(point: Point) -> list[Point]:

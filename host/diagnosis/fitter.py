@@ -177,10 +177,8 @@ class Fitter:
         """
         starts = starts_of(self, parent, name, values, rival)
         fit, is_white = self._fit(starts), not parent.fit.has_process_noise
-        brings_pole = named(name).parameters[0].name in SHARING_POLES
-        is_idle = fit.log_likelihood < parent.fit.log_likelihood + ROUGHLY
         end = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
-        others = with_poles_swapped(end) if brings_pole or is_idle else []
+        others = with_poles_swapped(end) if named(name).parameters[0].name in SHARING_POLES else []
         if not has_usual_heave(end):
             others.append(with_usual_heave(end))
         if is_white:
