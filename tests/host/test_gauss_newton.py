@@ -19,7 +19,9 @@ def linear_problem(seed: int, drag: float, share: float) -> tuple[GaussNewton, n
     """Normal equations of white innovations e = S d, with their sensitivities to the free parameters."""
     rng = np.random.default_rng(seed)
     scores = np.zeros((2, len(NAMES) + 4, 200))
-    scores[:, : len(NAMES)][:, FREE] = rng.standard_normal((2, 3, 200)) + 0.5 * rng.standard_normal((2, 1, 200))
+    scores[:, : len(NAMES)][:, FREE] = rng.standard_normal((2, 3, 200)) + 0.5 * rng.standard_normal(
+        (2, 1, 200)
+    )
     wanted = rng.standard_normal(3) * np.array([0.3, 1.0, 1.0])
     S = scores[:, : len(NAMES)][:, FREE].transpose(1, 0, 2).reshape(3, -1)
     error = (S.T @ wanted).reshape(2, 200) + 0.01 * rng.standard_normal((2, 200))
