@@ -40,7 +40,8 @@ def test_a_step_is_the_best_within_its_bounds(seed: int, drag: float, share: flo
     box = box[0] - 1e-12, box[1] + 1e-12
     best = lsq_linear(S, error, bounds=box).x
     moved = problem.trial(0.0).parameters[FREE] - here
-    assert (moved >= box[0]).all() and (moved <= box[1]).all()
+    assert (moved >= box[0]).all()
+    assert (moved <= box[1]).all()
     least, reached = (float(np.sum((error - S @ step) ** 2)) for step in (best, moved))
     # What has once met its bound stays there for this step; on these problems that costs hardly anything.
     assert reached <= 1.15 * least + 1.0
