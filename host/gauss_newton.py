@@ -64,7 +64,7 @@ class GaussNewton:
         """Deviance, of `cost` here, after the full step if the equations were linear."""
         reduced, rhs = self._reduced()
         left = cost - sum(float(gx @ np.linalg.solve(Hxx, gx)) for _, Hxx, gx in self.own)
-        step = self._step(reduced, rhs, damping=1e-9)
+        step = self._reached(reduced, rhs, damping=1e-9) - self.point.parameters[self.free]
         return left - float(step @ (2.0 * rhs - reduced @ step))
 
     def information(self) -> Array:
@@ -87,9 +87,9 @@ class GaussNewton:
         reduced, rhs = self._reduced()
         if not np.isfinite(reduced).all():
             return self.point  # the model has run away: no step is better than none
-        moved = self._step(reduced, rhs, damping)
         parameters = self.point.parameters.copy()
-        parameters[self.free] += moved
+        parameters[self.free] = self._reached(reduced, rhs, damping)
+        moved = parameters[self.free] - self.point.parameters[self.free]
         initial = [
             x0 + np.linalg.solve(Hxx * (1.0 + damping * np.eye(NX0)), gx - Hpx.T @ moved)
             for x0, (Hpx, Hxx, gx) in zip(self.point.initial, self.own, strict=True)
@@ -103,23 +103,25 @@ class GaussNewton:
             rhs -= Hpx @ np.linalg.solve(Hxx, gx)
         return self.information(), rhs
 
-    def _step(self, reduced: Array, rhs: Array, damping: float) -> Array:
-        """The damped step; what would leave its bounds stops there, and the others step to suit that."""
+    def _reached(self, reduced: Array, rhs: Array, damping: float) -> Array:
+        """Free parameters after a damped step; what would leave its bounds stops there, others suit that."""
         scale = np.sqrt(np.maximum(np.diag(self.H), 1e-300))
         normal = reduced / np.outer(scale, scale) + damping * np.eye(scale.size)
-        bounds, here = self.point.structure.parameters, self.point.parameters
-        lower = (np.array([p.lower for p in bounds]) - here)[self.free]
-        upper = (np.array([p.upper for p in bounds]) - here)[self.free]
-        step, inside = np.zeros(scale.size), np.ones(scale.size, dtype=bool)
+        bounds, here = self.point.structure.parameters, self.point.parameters[self.free]
+        lower = np.array([p.lower for p in bounds])[self.free]
+        upper = np.array([p.upper for p in bounds])[self.free]
+        reached, inside = here.copy(), np.ones(scale.size, dtype=bool)
         while inside.any():
-            left = rhs / scale - normal[:, ~inside] @ (step * scale)[~inside]
-            step[inside] = _solve(normal[np.ix_(inside, inside)], left[inside]) / scale[inside]
-            leaving = inside & ((step < lower) | (step > upper))
+            stopped = ((reached - here) * scale)[~inside]
+            left = rhs[inside] / scale[inside] - normal[np.ix_(inside, ~inside)] @ stopped
+            step = _solve(normal[np.ix_(inside, inside)], left) / scale[inside]
+            reached[inside] = here[inside] + step
+            leaving = (reached < lower) | (reached > upper)
             if not leaving.any():
                 break
-            step[leaving] = np.clip(step, lower, upper)[leaving]
+            reached = np.clip(reached, lower, upper)
             inside &= ~leaving
-        return step
+        return reached
 
 
 def _solve(normal: Array, rhs: Array) -> Array:

@@ -177,7 +177,7 @@ def _notes(fit: Fit | None, method: Method) -> list[str]:
     at_bound = [
         parameter.name
         for parameter, value, is_free in zip(fit.structure.parameters, fit.parameters, fit.free, strict=True)
-        if is_free and (value <= parameter.lower * (1 + 1e-9) or value >= parameter.upper)
+        if is_free and np.isclose(value, (parameter.lower, parameter.upper), rtol=1e-9, atol=0.0).any()
     ]
     if at_bound:
         notes.append(f"At the edge of what is physically possible: {', '.join(at_bound)}.")

@@ -169,21 +169,23 @@ class Fitter:
     ) -> Explanation:
         """The parent's set with one effect more, from the two most promising of its start values.
 
-        And where the parent may be bent into another valley than the truth, from what needs no parent.
+        And where the parent may be bent into another valley than the truth, from what needs no parent; where
+        the end may lie in another, from the end with poles swapped, or with the heave of a usual vehicle.
 
         values  start values of the effect's parameters from elsewhere, beside its own probes
         rival   the parent's set with another effect that does the same work: a start there, too, as the
                 coefficients of a parent without either may be bent into another valley
         """
         starts = starts_of(self, parent, name, values, rival)
-        fit, is_white = self._fit(starts), not parent.fit.has_process_noise
+        fit = self._fit(starts)
+        if parent.fit.has_process_noise:
+            return self._explained(parent.names | {name}, fit)
         end = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
-        others = with_poles_swapped(end) if named(name).parameters[0].name in SHARING_POLES else []
+        again = with_poles_swapped(end) if named(name).parameters[0].name in SHARING_POLES else []
         if not has_usual_heave(end):
-            others.append(with_usual_heave(end))
-        if is_white:
-            fit = max([fit, *(self._fit([start]) for start in others)], key=plausibility)
-        if is_white and named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
+            again.append(with_usual_heave(end))
+        fit = max([fit, *(self._fit([start]) for start in again)], key=plausibility)
+        if named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
             fit = self._fit([idle(starts[0], name)])
         return self._explained(parent.names | {name}, fit)
 

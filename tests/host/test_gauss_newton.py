@@ -36,12 +36,12 @@ def test_a_step_is_the_best_within_its_bounds(seed: int, drag: float, share: flo
     problem, S, error = linear_problem(seed, drag, share)
     bounds = [p for p, is_free in zip(STRUCTURE.parameters, FREE, strict=True) if is_free]
     here = problem.point.parameters[FREE]
-    box = np.array([p.lower for p in bounds]) - here, np.array([p.upper for p in bounds]) - here
-    box = box[0] - 1e-12, box[1] + 1e-12
-    best = lsq_linear(S, error, bounds=box).x
-    moved = problem.trial(0.0).parameters[FREE] - here
-    assert (moved >= box[0]).all()
-    assert (moved <= box[1]).all()
+    lower, upper = np.array([p.lower for p in bounds]), np.array([p.upper for p in bounds])
+    best = lsq_linear(S, error, bounds=(lower - here - 1e-12, upper - here + 1e-12)).x
+    there = problem.trial(0.0).parameters[FREE]
+    assert (there >= lower).all()
+    assert (there <= upper).all()
+    moved = there - here
     least, reached = (float(np.sum((error - S @ step) ** 2)) for step in (best, moved))
     # What has once met its bound stays there for this step; on these problems that costs hardly anything.
     assert reached <= 1.15 * least + 1.0

@@ -95,3 +95,13 @@ def test_answers_that_differ_little_are_told_by_what_differs_most() -> None:
     assert f"b1 = {near[3]:.4g} instead of {known[3]:.4g}." in sentence
     assert "u0 =" not in sentence
     assert "differ in the effects alone" in ambiguity(known, known.copy())
+
+
+def test_a_coefficient_at_the_edge_of_the_possible_is_told() -> None:
+    stiff = (-0.63084, -60.0, -600.0, 0.41385, -300.0, 2.5)  # pitch damped beyond any hull
+    result = identify([fly(Dive(vehicle=stiff, step=0.02, duration=40.0))[0]], default_vehicle())
+    (note,) = [note for note in result.notes if note.startswith("At the edge")]
+    assert "a2" in note
+    assert not any(
+        note.startswith("At the edge") for note in identify([fly(Dive())[0]], default_vehicle()).notes
+    )
