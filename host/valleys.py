@@ -8,7 +8,7 @@ A pole a1 that nearly cancels a zero can sit at another zero nearly as well, wit
 speed is not measured, one recording may have two maxima with different heave. A search ends in that in which
 it began; so the profile of the likelihood over a1 is walked on both sides, and every dip is entered. A lag in
 series with the pitch is one pole more, and so is heave where it turns the hull: which of the poles is whose,
-pitch alone does not say.
+pitch alone does not say. Nor does it say which way the plane pushes a hull that its own heave turns.
 """
 
 from dataclasses import replace
@@ -28,22 +28,23 @@ STRIDES = (0.12, 0.3, 0.55, 1.8, 3.3, 8.0)  # times a1
 FEW_ITERATIONS, ROUGHLY = 6, 0.3
 WORTH_ENTERING = 40.0  # of a log-likelihood below the best, that a point of the profile may lie
 ALMOST_AS_LIKELY = 3.0  # of a log-likelihood: odds of 20 to 1 and less rule nothing out
+USUAL_LEVER = 0.1  # m: b1/b2 of a plane at the stern of a small vehicle
 NEARLY_REAL = 0.3  # of its real part, the imaginary part of a pole that may be two
 APART = 4.0  # standard deviations between two modes
 USUAL_SPEED, SPEED_FACTOR = 1.5, 3.0  # m/s; gliders make 0.3, torpedoes 10
 A1, A2, A3, B1, B2, U0 = (NAMES.index(name) for name in ("a1", "a2", "a3", "b1", "b2", "u0"))
 LAGS, MUNK = ("lag_time", "pitch_lag_time"), "c_qw"
-SHARING_POLES = (*LAGS, MUNK)  # parameters of effects that bring a pole like those of pitch
+SHARING_POLES = (*LAGS, MUNK)  # parameters of effects that bring pitch a pole of their own
 
 
 def other_valleys(fit: Fit, inputs: list[Inputs]) -> list[Fit]:
-    """Ends of output-error searches that began with poles swapped, or with another heave damping.
+    """Ends of output-error searches that began with much the same pitch, or with another heave damping.
 
     Among them may be a likelier one, and the one that the search began with again. Where the speed is held,
     heave damping has one valley.
     """
     here = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
-    starts = [(start, fit.free) for start in with_poles_swapped(here)]
+    starts = [(start, fit.free) for start in alike_in_pitch(here)]
     if fit.free[A1] and fit.free[U0]:
         held = fit.free.copy()
         held[A1] = False
@@ -61,6 +62,26 @@ def _with_damping(point: Point, stride: float) -> Point:
     parameters = point.parameters.copy()
     parameters[[A1, B1]] *= stride  # the steady heave velocity stays
     return replace(point, parameters=point.structure.clipped(parameters))
+
+
+def alike_in_pitch(point: Point) -> list[Point]:
+    """Points whose pitch follows the plane like that of this one, but not the depth."""
+    return with_poles_swapped(point) + with_force_mirrored(point)
+
+
+def with_force_mirrored(point: Point) -> list[Point]:
+    """The point with a plane that pushes the other way, of a hull that is turned by its own heave (Munk).
+
+    Pitch knows the product of b1 and c_qw only. A force near zero begins from a usual one.
+    """
+    names, moved = list(point.structure.names), point.parameters.copy()
+    if MUNK not in names or moved[B1] == 0.0:
+        return []
+    least = USUAL_LEVER * abs(moved[B2])
+    factor = -max(1.0, least / abs(moved[B1]))
+    moved[B1] *= factor
+    moved[names.index(MUNK)] /= factor
+    return [replace(point, parameters=point.structure.clipped(moved))]
 
 
 def with_poles_swapped(point: Point) -> list[Point]:

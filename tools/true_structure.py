@@ -57,7 +57,7 @@ def heldout_errors(path: Path, names: tuple[str, ...], start: dict[str, float]) 
         grown = fitter.trimmed()
         for name in order:
             grown = fitter.grown(grown, name, [])
-        candidates.append(fitter.retrimmed(fitter.polished(grown), offsets))
+        candidates.append(fitter.polished(fitter.retrimmed(fitter.polished(grown), offsets)))
     best = min(candidates, key=lambda e: e.bic)
     fit = best.fit
     values = [start.get(name, value) for name, value in zip(fit.structure.names, fit.parameters, strict=True)]

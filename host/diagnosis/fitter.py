@@ -27,10 +27,10 @@ from host.recording import Array, Recording
 from host.rounding import thinned
 from host.valleys import (
     SHARING_POLES,
+    alike_in_pitch,
     log_prior,
     other_valleys,
     plausibility,
-    with_poles_swapped,
     with_rivals,
 )
 from host.wave_forces import wave_forces, wave_forces_from
@@ -42,6 +42,7 @@ COMPRESSED = "depth_dependent_buoyancy"
 FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 12, 0.2
 EXACT, SETTLED = 1e-3, 0.005  # of a log-likelihood, that an iteration of a polished fit may still gain
 NOT_THERE = 1.2  # times the sensor noise that the set left elsewhere: it has ended in another valley
+HOPELESS = 0.1  # of a log-likelihood per sample
 ROUGHLY = 1.0  # of a log-likelihood: a set does at least as well as with one member less
 
 
@@ -103,7 +104,10 @@ class Fitter:
         return self._explained(names, best)
 
     def retrimmed(self, explanation: Explanation, offsets: Names) -> Explanation:
-        """The same set with some of the catalogue's offsets in place of those it has, or of the free trim."""
+        """The same set with some of the catalogue's offsets in place of those it has, or of the free trim.
+
+        Not polished: most of the offsets that are tried explain nothing.
+        """
         names = (explanation.names - {FREE_TRIM.name, *OFFSETS}) | offsets
         fit = explanation.fit
         known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
@@ -119,7 +123,7 @@ class Fitter:
         structure = structure_of(names)
         parameters = np.array([known[name] for name in structure.names])
         start = Point(structure, parameters, fit.initial, fit.levels)
-        return self._explained(names, self._carried_on(start))
+        return self._explained(names, self._fit([start], hopeless(fit)))
 
     def with_sea(self, explanation: Explanation) -> Explanation:
         """The same set when random forces act as well; whatever grows from it is fitted with them, too."""
@@ -170,7 +174,7 @@ class Fitter:
         """The parent's set with one effect more, from the two most promising of its start values.
 
         And where the parent may be bent into another valley than the truth, from what needs no parent; where
-        the end may lie in another, from the end with poles swapped, or with the heave of a usual vehicle.
+        the end may lie in another, from points of much the same pitch, or with the heave of a usual vehicle.
 
         values  start values of the effect's parameters from elsewhere, beside its own probes
         rival   the parent's set with another effect that does the same work: a start there, too, as the
@@ -181,10 +185,10 @@ class Fitter:
         if parent.fit.has_process_noise:
             return self._explained(parent.names | {name}, fit)
         end = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
-        again = with_poles_swapped(end) if named(name).parameters[0].name in SHARING_POLES else []
+        again = alike_in_pitch(end) if named(name).parameters[0].name in SHARING_POLES else []
         if not has_usual_heave(end):
-            again.append(with_usual_heave(end))
-        fit = max([fit, *(self._fit([start]) for start in again)], key=plausibility)
+            again += with_usual_heave(end)
+        fit = max([fit, *(self._fit([start], hopeless(fit)) for start in again)], key=plausibility)
         if named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
             fit = self._fit([idle(starts[0], name)])
         return self._explained(parent.names | {name}, fit)
@@ -307,8 +311,8 @@ class Fitter:
         structure = structure_of(names)
         return Point(structure, np.array([known[name] for name in structure.names]), fit.initial, fit.levels)
 
-    def _fit(self, starts: list[Point]) -> Fit:
-        """Goes a few steps from every start and on from the best."""
+    def _fit(self, starts: list[Point], least: float = -np.inf) -> Fit:
+        """Goes a few steps from every start, and on from the best where that is at least so likely."""
         structure = starts[0].structure
         names = frozenset(effect.name for effect in structure.effects)
         inputs, free = self.inputs(names), self.free(names)
@@ -316,6 +320,8 @@ class Fitter:
             return self._carried_on(starts[0])
         fits = [output_error(start, inputs, free, FIRST_ITERATIONS, TOLERANCE) for start in starts]
         best = max(fits, key=lambda fit: fit.log_likelihood)
+        if best.log_likelihood < least:
+            return best
         on = Point(structure, best.parameters, best.initial, best.noise)
         return output_error(on, inputs, free, MOST_ITERATIONS, TOLERANCE)
 
@@ -328,6 +334,11 @@ class Fitter:
         if has_forces:
             return filter_error_from(start, inputs, free)
         return output_error(start, inputs, free, tolerance=tolerance)
+
+
+def hopeless(rival: Fit) -> float:
+    """The log-likelihood below which a few iterations from elsewhere hardly lead to more than the rival's."""
+    return rival.log_likelihood - HOPELESS * rival.samples
 
 
 def _first(values: Array) -> float:

@@ -260,7 +260,10 @@ class Search:
         for counts in ((0, 1), (2,)):
             ways = [frozenset(way) for count in counts for way in combinations(OFFSETS, count)]
             tasks = [("retrimmed", (e, way)) for e in polished for way in ways]
-            explained += [self.remember(e) for e in self.workers.results(tasks)]
+            retrimmed = [self.remember(e) for e in self.workers.results(tasks)]
+            least = min(e.bic for e in [*explained, *retrimmed])
+            near = [e for e in retrimmed if e.bic < least + ROUGH]
+            explained += [self.remember(e) for e in self.workers.results([("polished", (e,)) for e in near])]
             best = min(explained, key=lambda e: e.bic)
             if best.bic < leading.bic + margin(leading):
                 break

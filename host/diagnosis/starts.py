@@ -18,6 +18,7 @@ from host.equations import NAMES
 from host.gauss_newton import Point
 from host.output_error import annealed
 from host.recording import Array
+from host.valleys import USUAL_LEVER
 
 if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
@@ -26,7 +27,7 @@ FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley
 FEW = 1  # members of a set, the free trim among them, that lacks the most
 # 1/s, of a1: a base that lacks an effect may follow its plane at once, or hardly at all.
 INSTANT, USUAL_DAMPING, IDLE = -10.0, -1.0, -0.1
-A1, B1 = NAMES.index("a1"), NAMES.index("b1")
+A1, B1, B2 = (NAMES.index(name) for name in ("a1", "b1", "b2"))
 
 
 def starts_of(
@@ -43,7 +44,7 @@ def starts_of(
     if is_far(fitter, parent):
         del starts[1:]
     if not has_usual_heave(starts[0]):
-        starts += [with_usual_heave(start) for start in starts]
+        starts += [usual for start in starts for usual in with_usual_heave(start)]
     return starts + guesses
 
 
@@ -78,12 +79,20 @@ def has_usual_heave(point: Point) -> bool:
     return bool(INSTANT < point.parameters[A1] < IDLE)
 
 
-def with_usual_heave(start: Point) -> Point:
-    """A start with the heave damping of a usual vehicle; if it was fast, with the same steady velocity."""
-    parameters = start.parameters.copy()
-    parameters[B1] *= USUAL_DAMPING / parameters[A1] if parameters[A1] < INSTANT else 0.0
-    parameters[A1] = USUAL_DAMPING
-    return replace(start, parameters=parameters)
+def with_usual_heave(start: Point) -> list[Point]:
+    """Starts with the heave damping of a usual vehicle.
+
+    If heave was fast, with the same steady velocity; if it hardly moved, with a plane that pushes either way.
+    """
+    a1, b1, b2 = start.parameters[[A1, B1, B2]]
+    usual = USUAL_LEVER * b2
+    forces = [b1 * USUAL_DAMPING / a1] if a1 < INSTANT else [usual, -usual]
+    starts = []
+    for force in forces:
+        parameters = start.parameters.copy()
+        parameters[[A1, B1]] = USUAL_DAMPING, force
+        starts.append(replace(start, parameters=parameters))
+    return starts
 
 
 def _same_size(fitter: "Fitter", rival: Explanation, parent: Explanation, name: str) -> list[Array]:

@@ -9,11 +9,12 @@ from hidden_dive import BASE, hidden_dive
 from host.catalogue import structure_of
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.starts import with_usual_heave
 from host.gauss_newton import Point
 from host.output_error import output_error
 from host.propagate import free_run, inputs_of
 from host.recording import Array
-from host.valleys import other_valleys, with_poles_swapped
+from host.valleys import other_valleys, with_force_mirrored, with_poles_swapped
 
 AT_REST = np.array([0.0, 0.0, 0.0, 20.0])
 WEAKENED_AT = 31.3  # under a large plane angle, so that the recording can tell
@@ -61,6 +62,54 @@ def test_heave_that_turns_the_hull_and_a_pole_of_pitch_may_trade_places() -> Non
         run = free_run(one.parameters, AT_REST, inputs).outputs
         np.testing.assert_allclose(run[0], true[0], atol=2e-4)
         assert np.abs(run[1] - true[1]).max() > 0.01
+
+
+@pytest.mark.parametrize(("b1", "mirrored"), [(0.5, -0.5), (-0.02, 0.394)])
+def test_a_hull_turned_by_its_heave_does_not_say_which_way_its_plane_pushes(
+    b1: float, mirrored: float
+) -> None:
+    rows, structure = hidden_dive(duration=30.0), structure_of(("munk_moment",))
+    own = {**BASE, "b1": b1}
+    point = Point(structure, np.array([*own.values(), 0.0, 0.0, 1.0]), [AT_REST], np.zeros(4))
+    inputs = inputs_of(rows, structure)
+    true = free_run(point.parameters, AT_REST, inputs).outputs
+    (other,) = with_force_mirrored(point)
+    assert other.parameters[3] == pytest.approx(mirrored, abs=1e-3)
+    run = free_run(other.parameters, AT_REST, inputs).outputs
+    np.testing.assert_allclose(run[0], true[0], atol=1e-6)
+    assert np.abs(run[1] - true[1]).max() > 0.1
+    without = Point(structure_of(()), point.parameters[:-1], [AT_REST], np.zeros(4))
+    assert with_force_mirrored(without) == []
+
+
+def test_a_plane_thought_to_push_the_wrong_way_is_turned_round(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows, structure = hidden_dive(duration=90.0), structure_of(("munk_moment",))
+    true = np.array([*{**BASE, "a1": -1.5, "b1": 0.7}.values(), 0.0, 0.0, 5.0])
+    pitch, depth = free_run(true, AT_REST, inputs_of(rows, structure)).outputs
+    rng = np.random.default_rng(2)
+    noise = np.array([[2e-3], [4e-3]]) * rng.standard_normal((2, rows.time.size))
+    fitter = Fitter([replace(rows, pitch=pitch + noise[0], depth=depth + noise[1])])
+    monkeypatch.setattr("host.diagnosis.starts.may_be_bent", lambda *_: False)
+    wrong = fitter.base.fit.parameters.copy()
+    wrong[[0, 3]] = -0.8, -0.05
+    parent = Explanation(fitter.base.names, replace(fitter.base.fit, parameters=wrong), fitter.base.bic)
+    found = fitter.polished(fitter.grown(parent, "munk_moment", [np.array([-12.0])]))
+    assert found.fit.parameters[3] == pytest.approx(0.7, abs=0.1)
+    assert found.fit.parameters[-1] == pytest.approx(5.0, abs=0.7)
+
+
+@pytest.mark.parametrize("b1", [0.4, -0.4])
+def test_a_heave_that_hardly_moves_begins_again_with_a_plane_that_pushes_either_way(b1: float) -> None:
+    slow = Point(
+        structure_of(()), np.array([-0.02, -3.4, -8.2, 0.02, -4.0, 2.5, 0.0, 0.0]), [AT_REST], np.zeros(4)
+    )
+    assert [tuple(start.parameters[[0, 3]]) for start in with_usual_heave(slow)] == [
+        (-1.0, -0.4),
+        (-1.0, 0.4),
+    ]
+    fast = replace(slow, parameters=np.array([-20.0, -3.4, -8.2, 20.0 * b1, -4.0, 2.5, 0.0, 0.0]))
+    (start,) = with_usual_heave(fast)
+    assert tuple(start.parameters[[0, 3]]) == pytest.approx((-1.0, b1))
 
 
 def test_the_depth_tells_which_of_the_poles_is_the_lag() -> None:
