@@ -102,7 +102,7 @@ class Effect:
               needs a state of its own, which starts at the command
     plane     changes the angle at which the plane acts
     sense     changes what the sensors give
-    follows   where its state follows another with a first-order lag: that state, and the time constant's name
+    follows   where its state follows something with a first-order lag: that, and the time constant's name
     state     name of the state the effect brings with it, and `initial`, its value at the first row
     probes    start values of its parameters to try; `scales` fits them to a recording
     periods   limits, s, of the last parameter where it is a period, to be read off the residuals
@@ -126,7 +126,7 @@ class Effect:
     actuator: Callable[[Chain, ca.SX, ca.SX], tuple[ca.SX, ca.SX]] | None = None
     plane: Term | None = None
     sense: Term | None = None
-    follows: tuple[str, str] | None = None
+    follows: tuple[Callable[[Chain], ca.SX], str] | None = None
     state: str | None = None
     initial: Callable[[Chain], ca.SX] | None = None
     sizes: tuple[str, ...] | None = None
@@ -196,8 +196,8 @@ class Structure:
         )
 
     @property
-    def followers(self) -> list[tuple[str, str, str]]:
-        """States that follow another with a lag: own name, the other's, that of the time constant."""
+    def followers(self) -> list[tuple[str, Callable[[Chain], ca.SX], str]]:
+        """States that follow something with a lag: the name, what it follows, the time constant's name."""
         return [(e.state, *e.follows) for e in self.effects if e.follows is not None and e.state is not None]
 
     def derivative(self, chain: Chain) -> ca.SX:

@@ -13,7 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from host.equations import BASE, STATES, Structure
+from host.equations import BASE, STATES, Chain, Structure
 from host.recording import Array, Recording
 from host.speed import smoothed_speed
 
@@ -121,9 +121,11 @@ class Form:
             for name, value in moved.items():
                 x[states.index(name)] = value
             for name, followed, lag in self.structure.followers:
-                i, own = states.index(followed), states.index(name)
-                time_constant = p[self.structure.names.index(lag)]
-                x[own] = _behind(before[own], before[i], x[i], (k4[i] - k1[i]) / (2 * h), time_constant, h)
+                own, time_constant = states.index(name), p[self.structure.names.index(lag)]
+                start, slope_then = _followed(self, followed)(before, k1, p, drive)
+                end, slope_now = _followed(self, followed)(x, k4, p, drive)
+                bend = (slope_now - slope_then) / (2 * h)
+                x[own] = _behind(before[own], start, end, bend, time_constant, h)
         return x
 
     def outputs(self, x: ca.SX, p: ca.SX, drive: ca.SX) -> ca.SX:
@@ -149,6 +151,14 @@ def _slope(form: Form) -> ca.Function:
     chain = form.structure.chain(x, p, drive, time)
     chain.plane = plane
     return ca.Function("slope", [x, time, plane, p, drive], [form.structure.derivative(chain)])
+
+
+@cache
+def _followed(form: Form, of: Callable[[Chain], ca.SX]) -> ca.Function:
+    """What a sensor follows with a lag, and its rate where the state moves so."""
+    x, p, drive = form.symbols()
+    rates, value = ca.SX.sym("rates", form.nx), of(form.structure.chain(x, p, drive, drive[4]))
+    return ca.Function("followed", [x, rates, p, drive], [value, ca.jtimes(value, x, rates)])
 
 
 @cache
@@ -242,8 +252,14 @@ def over_rows(step: Callable[[Form], ca.Function], form: Form, rows: int) -> Ove
 
 @cache
 def _accumulated(step: Callable[[Form], ca.Function], form: Form, rows: int) -> ca.Function:
-    """Over few rows: CasADi takes longer to build such a function over many than to run it."""
-    return step(form).mapaccum(f"rows_{rows}", rows)
+    """Over few rows: CasADi takes longer to build such a function over many than to run it.
+
+    Its results are made dense, as the arrays that it writes into are: what is always zero takes a place, too.
+    """
+    one = step(form)
+    inputs = one.sx_in()
+    dense = ca.Function(one.name(), inputs, [ca.densify(result) for result in one.call(inputs)])
+    return dense.mapaccum(f"rows_{rows}", rows)
 
 
 def form_of(inputs: Inputs) -> Form:

@@ -7,8 +7,7 @@ from host.equations import Chain, Effect, Parameter
 
 
 def _offset(c: Chain) -> None:
-    c.command = c.command + c.p["rudder_zero"]
-    c.earlier = [command + c.p["rudder_zero"] for command in c.earlier]
+    c.plane = c.plane + c.p["rudder_zero"]
 
 
 def _delay(c: Chain) -> None:
@@ -28,6 +27,8 @@ def _saturation(c: Chain) -> None:
 
 
 def _rate_limit(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:
+    if "lag_time" in c.p:
+        return c.plane, c.plane  # a servo has one rate, and its lag limits it already
     farthest = c.p["plane_rate"] * substep
     moved = limited(c.plane - held, farthest)
     share = ca.fmin(1, ca.fabs(c.plane - held) / farthest)  # of the sub-step that the plane is under way
@@ -35,10 +36,17 @@ def _rate_limit(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def _lag(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:
-    time = c.p["lag_time"]
-    left = ca.exp(-substep / time)
-    mean = c.plane + (held - c.plane) * time / substep * (1 - left)
-    return mean, c.plane + (held - c.plane) * left
+    """The mean over the sub-step, and the end: at the largest rate first where that is limited."""
+    time, away = c.p["lag_time"], c.plane - held
+    if "plane_rate" in c.p:
+        rate = c.p["plane_rate"]
+        hurried = ca.fmax(0, ca.fmin(substep, ca.fabs(away) / rate - time))
+        moved = ca.sign(away) * rate * hurried
+    else:
+        hurried, moved = ca.SX(0), ca.SX(0)
+    left = ca.exp((hurried - substep) / time)
+    behind = (away - moved) * time * (1 - left) - moved * hurried / 2 + away * hurried
+    return c.plane - behind / substep, c.plane - (away - moved) * left
 
 
 def _backlash(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:  # noqa: ARG001
@@ -68,10 +76,10 @@ EFFECTS = (
         slot="actuator",
         parameters=(Parameter(name="rudder_zero", unit="rad", lower=-0.5, upper=0.5, meaning="zero error"),),
         sentence="The plane's zero is off: the commanded angle and the acting one differ by a constant.",
-        equation="delta = command + rudder_zero",
+        equation="delta = servo + rudder_zero",
         manoeuvre="level flight with the planes at zero at two speeds",
         probes=((0.0,),),
-        command=_offset,
+        plane=_offset,
     ),
     Effect(
         name="actuator_delay",
@@ -103,9 +111,9 @@ EFFECTS = (
             Parameter(name="plane_rate", unit="rad/s", lower=0.005, upper=100, meaning="largest rate"),
         ),
         sentence="The plane turns no faster than a fixed rate.",
-        equation="|delta'| <= plane_rate",
+        equation="|delta'| <= plane_rate, that of a lag included",
         manoeuvre="plane steps of different sizes: the time they take grows with the size",
-        probes=((0.3,), (1.0,), (3.0,)),
+        probes=((0.3,), (1.0,), (3.0,), (6.0,), (15.0,)),  # the last where a lag is quicker than its limit
         scales=("rudder",),
         sizes=(),
         actuator=_rate_limit,

@@ -5,12 +5,21 @@ import casadi as ca
 from host.equations import Chain, Effect, Parameter
 
 
+def _felt_depth(c: Chain) -> ca.SX:
+    """The depth where the sensor sits."""
+    return c.zeta - c.p.get("sensor_forward", ca.SX(0)) * ca.sin(c.theta)
+
+
 def _lever_arm(c: Chain) -> None:
-    c.sensed_depth = c.sensed_depth - c.p["sensor_forward"] * ca.sin(c.theta)
+    c.sensed_depth = c.sensed_depth - c.zeta + _felt_depth(c)
 
 
 def _lagged_depth(c: Chain) -> None:
-    c.sensed_depth = c.sensed_depth - c.zeta + c.extra["depth_lag"]
+    c.sensed_depth = c.sensed_depth - _felt_depth(c) + c.extra["depth_lag"]
+
+
+def _true_pitch(c: Chain) -> ca.SX:
+    return c.theta
 
 
 def _bias(c: Chain) -> None:
@@ -41,13 +50,13 @@ EFFECTS = (
             Parameter(name="depth_lag_time", unit="s", lower=0.03, upper=20, meaning="time constant"),
         ),
         sentence="The depth reading follows the depth with a lag (a filter, or a clogged port).",
-        equation="recorded depth' = (zeta - recorded depth)/depth_lag_time",
+        equation="recorded depth' = (zeta - recorded depth)/depth_lag_time, zeta that at the sensor",
         manoeuvre="quick reversals of a steep climb and dive",
         probes=((0.3,), (1.5,)),
-        follows=("zeta", "depth_lag_time"),
+        follows=(_felt_depth, "depth_lag_time"),
         sense=_lagged_depth,
         state="depth_lag",
-        initial=lambda c: c.zeta,
+        initial=_felt_depth,
     ),
     Effect(
         name="pitch_bias",
@@ -69,9 +78,9 @@ EFFECTS = (
         equation="recorded pitch' = (theta - recorded pitch)/pitch_lag_time",
         manoeuvre="quick pitch reversals with the depth recorded at a high rate",
         probes=((0.2,), (0.8,)),
-        follows=("theta", "pitch_lag_time"),
+        follows=(_true_pitch, "pitch_lag_time"),
         sense=_lagged_pitch,
         state="pitch_lag",
-        initial=lambda c: c.theta,
+        initial=_true_pitch,
     ),
 )

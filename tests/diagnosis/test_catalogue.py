@@ -100,6 +100,33 @@ def test_the_zero_error_of_a_plane_is_delayed_with_its_command() -> None:
     np.testing.assert_allclose(run.outputs, true.outputs, atol=1e-9)
 
 
+def test_the_zero_error_of_a_plane_lies_behind_its_stops() -> None:
+    rows = hidden_dive(duration=30.0)
+    both = inputs_of(rows, structure_of(("rudder_offset", "actuator_saturation")))
+    values = dict.fromkeys(both.structure.names, 0.0) | BASE | {"rudder_zero": 0.02, "plane_limit": 0.1}
+    run = free_run(np.array([values[name] for name in both.structure.names]), START, both)
+    moved = inputs_of(replace(rows, rudder=np.clip(rows.rudder, -0.1, 0.1) + 0.02))
+    true = free_run(np.array([*BASE.values(), 0.0, 0.0]), START, moved)
+    np.testing.assert_allclose(run.outputs, true.outputs, atol=1e-9)
+
+
+@pytest.mark.parametrize("lag", [0.05, 0.6])
+def test_a_slow_depth_sensor_feels_the_depth_where_it_sits(lag: float) -> None:
+    rows, names = hidden_dive(duration=30.0), ("depth_sensor_lag", "depth_sensor_lever_arm")
+    structure = structure_of(names)
+    values = dict.fromkeys(structure.names, 0.0) | BASE | {"depth_lag_time": lag, "sensor_forward": 0.8}
+    run = free_run(np.array([values[n] for n in structure.names]), START, inputs_of(rows, structure, 0.05))
+    fine = finer(finer(rows))
+    _, _, theta, zeta = free_run(np.array([*BASE.values(), 0.0, 0.0]), START, inputs_of(fine)).states
+    felt = zeta - 0.8 * np.sin(theta)
+    reading, read = felt[0], np.empty(felt.size)
+    for k, depth in enumerate(felt):
+        reading = depth + (reading - depth) * np.exp(-fine.step / lag)
+        read[k] = reading
+    rate = np.abs(np.gradient(felt, fine.step)).max()
+    np.testing.assert_allclose(run.outputs[1], read[:: EACH**2], atol=1.5 * fine.step * rate)
+
+
 def test_a_low_centre_of_gravity_feels_a_change_of_speed() -> None:
     # With the planes level and no heave only the surge acceleration turns the vehicle: theta = -u'/g.
     still = hidden_dive(duration=30.0)
@@ -130,3 +157,20 @@ def test_an_effect_of_no_size_is_absent(name: str) -> None:
 def test_an_unknown_effect_is_a_key_error() -> None:
     with pytest.raises(KeyError, match="warp"):
         structure_of(("warp",))
+
+
+@pytest.mark.parametrize("substep", [0.05, 0.1])
+def test_a_servo_with_a_lag_and_a_limited_rate_is_one_servo(substep: float) -> None:
+    rows, lag, rate = hidden_dive(duration=20.0), 0.3, 0.4
+    structure = structure_of(("actuator_lag", "actuator_rate_limit"))
+    known = BASE | {"heave_offset": 0.0, "pitch_offset": 0.0, "lag_time": lag, "plane_rate": rate}
+    run = free_run(
+        np.array([known[name] for name in structure.names]), START, inputs_of(rows, structure, substep)
+    )
+    plane, fine, followed = rows.rudder[0], 1000, []
+    for command in rows.rudder:
+        followed.append(plane)
+        for _ in range(fine):
+            plane += rows.step / fine * np.clip((command - plane) / lag, -rate, rate)
+    assert np.ptp(np.diff(followed)) > 1.9 * rate * rows.step  # it was at its limit either way
+    np.testing.assert_allclose(run.states[structure.states.index("lagged")], followed, atol=1e-4)
