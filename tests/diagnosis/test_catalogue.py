@@ -34,17 +34,21 @@ def test_catalogue_holds_every_name_that_users_rely_on() -> None:
     assert {effect.name for effect in CATALOGUE} >= NAMES_OF_THE_FORMAT
 
 
-@pytest.mark.parametrize("name", sorted(BY_NAME))
-def test_effect_acts_and_its_sensitivities_are_exact(name: str) -> None:
+PAIRS = [("actuator_lag", "actuator_rate_limit"), ("depth_sensor_lag", "depth_sensor_lever_arm")]
+
+
+@pytest.mark.parametrize("names", [*((name,) for name in sorted(BY_NAME)), *PAIRS], ids="+".join)
+def test_effects_act_and_their_sensitivities_are_exact(names: tuple[str, ...]) -> None:
     recording = hidden_dive(duration=30.0)
-    structure = structure_of((name,))
+    structure = structure_of(names)
     inputs = inputs_of(recording, structure)
-    values = np.concatenate([[*BASE.values(), 0.0, 0.0], probe_of(name)])
+    probes = [probe_of(effect.name) for effect in structure.effects]
+    values = np.concatenate([[*BASE.values(), 0.0, 0.0], *probes])
     run = free_run(values, START, inputs).outputs
     plain = free_run(values[:8], START, inputs_of(recording)).outputs
     assert np.abs(run - plain).max() > 1e-5
     _, sensitivity = innovations(values, START, inputs)
-    for index in range(8, values.size):
+    for index in range(values.size):
         change = np.zeros(values.size)
         change[index] = 1e-6 * max(1.0, abs(values[index]))
         ends = [free_run(values + sign * change, START, inputs).outputs for sign in (1.0, -1.0)]
