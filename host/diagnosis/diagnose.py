@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from host.catalogue import BY_NAME, CATALOGUE, UNKNOWN, named
 from host.diagnosis.exchange import twins
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.leftover import SEA_DOUBT, Leftover, leftover
+from host.diagnosis.leftover import Leftover, leftover
 from host.diagnosis.locate import Location, locate
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.search import Search
@@ -19,6 +19,7 @@ from host.diagnosis.seas import WAVES, Waves, among_waves, in_a_sea
 from host.diagnosis.spans import Spans, divide, excerpt
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.unknown_physics import known_in, unknown_in, with_unknown
+from host.diagnosis.verdict import Verdict, remaining, verdict_on
 from host.diagnosis.workers import Workers
 from host.equations import NAMES, Slot
 from host.identifiability import ambiguity
@@ -27,8 +28,6 @@ from host.outliers import without_outliers
 from host.recording import Array, Recording
 from host.uncertainty import covariance
 
-Verdict = Literal["no_mismatch", "explained", "partly_explained", "unexplained"]
-WORSE = 2.0  # chi2 of held-out spans from which on an explanation must at least better the base there
 MOST_WORTH = 1e9  # of BIC: without some effects the equations run away
 SLOTS: tuple[Slot, ...] = ("heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment")
 
@@ -109,7 +108,7 @@ def diagnose(
         if waves is not None and WAVES not in best.names:
             effects.append(NamedEffect(name=WAVES, delta_bic=waves.delta_bic))
         effects.sort(key=lambda effect: -effect.delta_bic)
-        verdict = _verdict(model, left, before, after)
+        verdict = verdict_on(model, left, before, after)
         slots = _slots(search, best, effects, verdict)
     has_sea = best.fit.has_process_noise
     on_progress("final fit on everything")
@@ -134,7 +133,7 @@ def diagnose(
         location=locate(longest, errors, floor, values["u0"]),
         force=unknown_force(longest, {n: values[n] for n in NAMES}, floor, fitter.accelerations),
         ranking=_ranking(search),
-        remaining=" ".join([_remaining(verdict, model, left, after), *_other_answers(extended)]),
+        remaining=" ".join([remaining(verdict, model, left, after), *_other_answers(extended)]),
         has_sea=has_sea,
         bic=best.bic,
         std=std,
@@ -192,16 +191,6 @@ def _refitted(explanation: Explanation, recordings: list[Recording]) -> Explanat
     return fitter.with_sea(again) if explanation.fit.has_process_noise else again
 
 
-def _verdict(best: Explanation, left: Leftover, before: Misfit, after: Misfit) -> Verdict:
-    if left.is_nothing and not best.names:
-        return "no_mismatch"
-    # Random forces spoil a free run whatever is known: it need not be better for knowing more.
-    worst = max(before.chi2 * (SEA_DOUBT if best.fit.has_process_noise else 1.0), WORSE)
-    if left.is_nothing and after.chi2 < worst and not unknown_in(best):
-        return "explained"
-    return "partly_explained" if known_in(best) and after.chi2 < 0.7 * before.chi2 else "unexplained"
-
-
 def _slots(
     search: Search, best: Explanation, effects: list[NamedEffect], verdict: Verdict
 ) -> dict[Slot, float]:
@@ -230,35 +219,3 @@ def _other_answers(extended: Explanation) -> list[str]:
     """Of the same physics with other coefficients, which the deviations include."""
     fit = extended.fit
     return [ambiguity(fit.parameters, rival.parameters) for rival in fit.rivals]
-
-
-def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit) -> str:
-    sea = (
-        " Random forces act as well (waves, current, turbulence); they are part of the noise model."
-        * best.fit.has_process_noise
-    )
-    if verdict == "no_mismatch":
-        return "Nothing is missing from the base model on this recording." + sea
-    forms = "".join(f" {sentence}" for sentence in unknown_in(best))
-    if verdict == "explained":
-        return "What is left is as small as the sensors' own noise." if not sea else sea.strip()
-    if forms and left.is_nothing:
-        return f"Physics is at work that the catalogue does not hold.{forms}" + sea
-    worst = "depth" if after.chi2_depth > after.chi2_pitch else "pitch"
-    size = max(after.chi2_depth, after.chi2_pitch) ** 0.5
-    if left.is_smooth:
-        kind = "it depends on the motion, so it is physics and no sea, but none that is known here"
-    elif left.is_nothing:
-        kind = "what was learnt does not hold on the stretches that were held out"
-    elif left.is_no_sea:
-        kind = "it acts like noise, but too weakly for a sea: physics left out that comes and goes"
-    elif left.is_coloured:
-        kind = "it does not follow the motion: a disturbance with a rhythm or a drift of its own"
-    else:
-        kind = "it is as rough as sensor noise, but larger than these sensors show elsewhere"
-    is_part = verdict == "partly_explained"
-    begin = "Most is explained, but" if is_part else "None of the physics in the catalogue explains this:"
-    return (
-        f"{begin} {worst} is still off by {size:.1f} times its sensor noise in a free run; {kind}.{forms}"
-        + sea
-    )

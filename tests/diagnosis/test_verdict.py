@@ -1,0 +1,63 @@
+"""The verdict on an explanation that leaves nothing, little or much, and what is said of the rest."""
+
+import pytest
+from hidden_dive import hidden_dive
+
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.leftover import Leftover
+from host.diagnosis.scoring import Misfit
+from host.diagnosis.verdict import Verdict, rare_in, remaining, verdict_on
+
+COMMON = {"heave_pitch_rate_coupling", "munk_moment", "speed_loss", "actuator_lag", "net_buoyancy"}
+RARE = ("ballast_change", "depth_sensor_lever_arm", "internal_wave")
+
+
+@pytest.fixture(scope="module")
+def base() -> Explanation:
+    return Fitter([hidden_dive(duration=40.0)]).base
+
+
+def named(base: Explanation, *names: str) -> Explanation:
+    """The fit of the base, as if it were that of a set: the verdict looks at names and noise only."""
+    return Explanation(frozenset(names), base.fit, base.bic)
+
+
+def misfit(chi2: float) -> Misfit:
+    return Misfit(depth_rmse_m=0.0, pitch_rmse_rad=0.0, chi2_depth=chi2, chi2_pitch=chi2)
+
+
+def leftover(*, is_smooth: bool = False) -> Leftover:
+    return Leftover(
+        is_coloured=False, is_local=False, is_no_sea=False, is_above_floor=False, smooth_gain=0.0,
+        is_smooth=is_smooth,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("names", "is_smooth", "after", "verdict"),
+    [
+        ((), False, 1.0, "no_mismatch"),
+        (RARE[:2], False, 1.0, "explained"),
+        ((*COMMON, *RARE[:2]), False, 1.0, "explained"),
+        (RARE, False, 1.0, "partly_explained"),
+        (RARE[:1], True, 1.0, "partly_explained"),
+        (RARE[:1], True, 4.0, "unexplained"),
+        ((), True, 5.0, "unexplained"),
+    ],
+)
+def test_verdict(
+    base: Explanation, names: tuple[str, ...], is_smooth: bool, after: float, verdict: Verdict
+) -> None:
+    left = leftover(is_smooth=is_smooth)
+    assert verdict_on(named(base, *names), left, misfit(5.0), misfit(after)) == verdict
+
+
+def test_many_effects_that_few_vehicles_have_are_doubted_by_name(base: Explanation) -> None:
+    crowd = named(base, *COMMON, *RARE)
+    assert sorted(rare_in(crowd)) == sorted(RARE)
+    said = remaining("partly_explained", crowd, leftover(), misfit(1.0))
+    assert said.startswith("Nothing else is left, but ballast change, ")
+    assert "may imitate physics that the catalogue does not hold" in said
+    off = remaining("partly_explained", crowd, leftover(), misfit(4.0))
+    assert "what was learnt does not hold on the stretches that were held out" in off
