@@ -8,7 +8,8 @@ A pole a1 that nearly cancels a zero can sit at another zero nearly as well, wit
 speed is not measured, one recording may have two maxima with different heave. A search ends in that in which
 it began; so the profile of the likelihood over a1 is walked on both sides, and every dip is entered. A lag in
 series with the pitch is one pole more, and so is heave where it turns the hull: which of the poles is whose,
-pitch alone does not say. Nor does it say which way the plane pushes a hull that its own heave turns.
+pitch alone does not say. Nor does it say which way the plane pushes a hull that its own heave turns. A lag of
+the depth sensor is a pole in series with heave's, and pitch-rate coupling makes up for what else differs.
 """
 
 from dataclasses import replace
@@ -33,18 +34,18 @@ NEARLY_REAL = 0.3  # of its real part, the imaginary part of a pole that may be 
 APART = 4.0  # standard deviations between two modes
 USUAL_SPEED, SPEED_FACTOR = 1.5, 3.0  # m/s; gliders make 0.3, torpedoes 10
 A1, A2, A3, B1, B2, U0 = (NAMES.index(name) for name in ("a1", "a2", "a3", "b1", "b2", "u0"))
-LAGS, MUNK = ("lag_time", "pitch_lag_time"), "c_qw"
-SHARING_POLES = (*LAGS, MUNK)  # parameters of effects that bring pitch a pole of their own
+LAGS, DEPTH_LAG, MUNK, COUPLING = ("lag_time", "pitch_lag_time"), "depth_lag_time", "c_qw", "c_wq"
+SHARING_POLES = (*LAGS, DEPTH_LAG, MUNK)  # parameters of effects that bring a pole of their own
 
 
 def other_valleys(fit: Fit, inputs: list[Inputs]) -> list[Fit]:
-    """Ends of output-error searches that began with much the same pitch, or with another heave damping.
+    """Ends of output-error searches that began with much the same motion, or with another heave damping.
 
     Among them may be a likelier one, and the one that the search began with again. Where the speed is held,
     heave damping has one valley.
     """
     here = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
-    starts = [(start, fit.free) for start in alike_in_pitch(here)]
+    starts = [(start, fit.free) for start in look_alikes(here)]
     if fit.free[A1] and fit.free[U0]:
         held = fit.free.copy()
         held[A1] = False
@@ -64,9 +65,29 @@ def _with_damping(point: Point, stride: float) -> Point:
     return replace(point, parameters=point.structure.clipped(parameters))
 
 
-def alike_in_pitch(point: Point) -> list[Point]:
-    """Points whose pitch follows the plane like that of this one, but not the depth."""
-    return with_poles_swapped(point) + with_force_mirrored(point)
+def look_alikes(point: Point) -> list[Point]:
+    """Points whose pitch, or whose recorded depth, follows the plane like that of this one."""
+    return with_poles_swapped(point) + with_force_mirrored(point) + with_depth_lag_swapped(point)
+
+
+def with_depth_lag_swapped(point: Point) -> list[Point]:
+    """The point with heave's pole in the place of the depth sensor's lag T, and the other way round.
+
+    The depth reading follows the plane, and the pitch, by
+
+        b1 delta / [(s - a1) (T s + 1)]        -[(u0 - c_wq) s - u0 a1] theta / [s (s - a1) (T s + 1)]
+    """
+    names, moved = list(point.structure.names), point.parameters.copy()
+    if DEPTH_LAG not in names or moved[A1] >= 0.0:
+        return []
+    lag = names.index(DEPTH_LAG)
+    ratio = -1.0 / (moved[A1] * moved[lag])  # of the new lag to the old
+    moved[[A1, lag]] = -1.0 / moved[[lag, A1]]
+    moved[B1] *= ratio
+    if COUPLING in names:
+        own = names.index(COUPLING)
+        moved[own] = moved[U0] - (moved[U0] - moved[own]) * ratio
+    return [replace(point, parameters=point.structure.clipped(moved))]
 
 
 def with_force_mirrored(point: Point) -> list[Point]:

@@ -7,6 +7,7 @@ from host.catalogue import BY_NAME, CATALOGUE, named
 from host.catalogue.kin import OFFSETS, PITCHING_INTO_DEPTH, is_time, measure_alike
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.margins import FEW, LARGEST_SET, NAMING_MARGIN, SMALL, TWIN_MARGIN, margin
+from host.diagnosis.pruning import pruned
 from host.diagnosis.workers import Task
 from host.whiteness import correlation_factor
 
@@ -51,7 +52,7 @@ def exchanged(search: "Search", best: Explanation) -> Explanation:
     close = [search.remember(e) for e in search.workers.results([("polished", (e,)) for e in close])]
     # Two members may stand for what one does that was not there: with it they are no longer needed.
     close = [e for e in close if e.bic < best.bic + margin(best)]
-    leaner = (search.pruned(e) if 1 < len(e.names) <= SMALL else e for e in close)
+    leaner = (pruned(search, e) if 1 < len(e.names) <= SMALL else e for e in close)
     rival = min(leaner, key=lambda e: e.bic, default=best)
     return rival if rival.bic < best.bic - 0.01 else best
 

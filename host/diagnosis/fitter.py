@@ -27,8 +27,8 @@ from host.recording import Array, Recording
 from host.rounding import thinned
 from host.valleys import (
     SHARING_POLES,
-    alike_in_pitch,
     log_prior,
+    look_alikes,
     other_valleys,
     plausibility,
     with_rivals,
@@ -174,7 +174,7 @@ class Fitter:
         """The parent's set with one effect more, from the two most promising of its start values.
 
         And where the parent may be bent into another valley than the truth, from what needs no parent; where
-        the end may lie in another, from points of much the same pitch, or with the heave of a usual vehicle.
+        the end may lie in another, from points of much the same motion, or with the heave of a usual vehicle.
 
         values  start values of the effect's parameters from elsewhere, beside its own probes
         rival   the parent's set with another effect that does the same work: a start there, too, as the
@@ -185,7 +185,7 @@ class Fitter:
         if parent.fit.has_process_noise:
             return self._explained(parent.names | {name}, fit)
         end = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
-        again = alike_in_pitch(end) if named(name).parameters[0].name in SHARING_POLES else []
+        again = look_alikes(end) if named(name).parameters[0].name in SHARING_POLES else []
         if not has_usual_heave(end):
             again += with_usual_heave(end)
         fit = max([fit, *(self._fit([start], hopeless(fit)) for start in again)], key=plausibility)

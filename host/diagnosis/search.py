@@ -4,8 +4,8 @@ Effects are never added one at a time for good: sets are carried side by side, e
 re-estimated with the base whenever one joins, members that no longer pay are dropped, and each member of the
 best set is exchanged for every other effect that might do its work. Each effect is fitted alone; what it
 could gain beside others is predicted by one Gauss-Newton step from there, and the promising ones are fitted.
-Where few effects leave much, what every vehicle has is fitted together and pruned: of many that act at once,
-each may look idle or be mistaken until the others are there.
+Where few effects leave much, or many were needed, what every vehicle has is fitted together and pruned: of
+many that act at once, each may look idle or be mistaken until the others are there.
 """
 
 from collections.abc import Callable, Iterable
@@ -16,11 +16,11 @@ from math import inf
 from host.catalogue import CATALOGUE, ORDINARY, named
 from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM
-from host.diagnosis.absence import one_step_without
 from host.diagnosis.exchange import exchanged
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import FEW, LARGEST_SET, NAMING_MARGIN, ROUGH, SMALL, margin
+from host.diagnosis.pruning import pruned
 from host.diagnosis.workers import Task, Workers
 from host.recording import Array
 
@@ -28,7 +28,6 @@ BEAM = 4  # single effects carried on
 FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
 NARROW = 2  # of larger sets, which cost most and of which there are most
 PROMISING = 6
-CLEARLY = 20.0  # times the margin: no doubt is left that a member is needed
 NEAR = 1.15  # times the noise floor: little is left, and gains are well predicted
 MOST_ROUNDS = 4
 
@@ -74,7 +73,18 @@ class Search:
             if not beam or beam[0].bic > best_before - margin(beam[0]):
                 break
         self.on_progress("settling")
-        return self._settled(self._retrimmed())
+        return self.completed(self._settled(self._retrimmed()))
+
+    def completed(self, best: Explanation) -> Explanation:
+        """A set of many, or what is left of it when all that every vehicle has joins at once.
+
+        One at a time they may promise nothing, where the set is bent to do without them.
+        """
+        if len(best.names) <= SMALL or {*ORDINARY} <= best.names or self.root.fit.has_process_noise:
+            return best
+        self.on_progress("what every vehicle has beside it")
+        (joint,) = self.across([self._with_ordinary(best)])
+        return min(best, pruned(self, joint), key=lambda e: e.bic)
 
     def without(self, best: Explanation, name: str) -> Explanation:
         """The set less one member."""
@@ -83,9 +93,9 @@ class Search:
     def each_without(self, best: Explanation, members: list[str]) -> list[Explanation]:
         """The set less each of these members; of a large one, what is far from it is fitted roughly."""
         sets = [best.names - {name} for name in members]
-        self._shrink(best, [names for names in sets if names not in self.tried])
+        self.shrink(best, [names for names in sets if names not in self.tried])
         limit = best.bic + (ROUGH if len(best.names) > LARGEST_SET else inf)
-        self._polish([names for names in sets if names in self._shrunk and self.tried[names].bic < limit])
+        self.polish([names for names in sets if names in self._shrunk and self.tried[names].bic < limit])
         return [self.tried[names] for names in sets]
 
     def gain_alone(self, name: str) -> float:
@@ -116,35 +126,7 @@ class Search:
         """The fit of a set with one effect, or form of unknown physics, more."""
         return "grown", (parent, name, self.values(name))
 
-    def pruned(self, explanation: Explanation) -> Explanation:
-        """The set less the members that do not pay for themselves."""
-        given, doubtful = explanation, self._doubtful(explanation)
-        while doubtful:
-            smaller = {explanation.names - {member}: member for member in sorted(doubtful)}
-            limit = explanation.bic + margin(explanation)
-            self._shrink(explanation, smaller)
-            if all(self.tried[names].bic > limit for names in smaller):
-                self._polish([names for names in smaller if self.tried[names].bic < limit + ROUGH])
-            leanest = min((self.tried[names] for names in smaller), key=lambda e: e.bic)
-            if leanest.bic > limit:
-                break
-            # What is clearly needed beside others is needed without them.
-            doubtful = {smaller[names] for names in smaller if self.tried[names].bic < limit + ROUGH}
-            doubtful &= leanest.names
-            explanation = leanest
-        if explanation is not given:
-            self._polish([explanation.names])
-        return self.tried.get(explanation.names, explanation)
-
-    def _doubtful(self, explanation: Explanation) -> set[str]:
-        """The members worth trying without: of a large set, where each takes long, not the clearly needed."""
-        if len(explanation.names) <= LARGEST_SET:
-            return set(explanation.names)
-        losses = {name: one_step_without(explanation.fit, named(name)) for name in explanation.names}
-        enough = CLEARLY * margin(explanation)
-        return {name for name, ahead in losses.items() if ahead is None or ahead[0] < enough}
-
-    def _shrink(self, explanation: Explanation, smaller: Iterable[Names]) -> None:
+    def shrink(self, explanation: Explanation, smaller: Iterable[Names]) -> None:
         """Fits sets of one member less roughly, once."""
         new = [names for names in smaller if names not in self._shrunk]
         members = [next(iter(explanation.names - names)) for names in new]
@@ -152,7 +134,7 @@ class Search:
             self.remember(found)
         self._shrunk.update(new)
 
-    def _polish(self, sets: Iterable[Names]) -> None:
+    def polish(self, sets: Iterable[Names]) -> None:
         """Fits sets to the end, once."""
         new = [names for names in sets if names not in self._polished]
         for found in self.workers.results([("polished", (self.tried[names],)) for names in new]):
@@ -178,13 +160,16 @@ class Search:
         fitted = [e for e in self.tried.values() if self.root.names <= e.names <= family]
         joint = min(fitted, key=lambda e: e.bic)
         self.on_progress("what every vehicle has")
-        for name in ORDINARY:
-            if name not in joint.names:
-                joint = self.fitter.grown(joint, name, self.values(name))
-        joint = self.remember(self.fitter.polished(joint))
+        joint = self._with_ordinary(joint)
         if joint.bic > leading.bic:
             return False
-        return self.fitter.excess(self.pruned(joint).fit) < NEAR
+        return self.fitter.excess(pruned(self, joint).fit) < NEAR
+
+    def _with_ordinary(self, explanation: Explanation) -> Explanation:
+        for name in ORDINARY:
+            if name not in explanation.names:
+                explanation = self.fitter.grown(explanation, name, self.values(name))
+        return self.remember(self.fitter.polished(explanation))
 
     def _parents(self, grown: list[Explanation]) -> list[Explanation]:
         """The best sets, as far as they explain a fair part of what the very best does."""
@@ -235,7 +220,7 @@ class Search:
         """Prunes and exchanges members of the set until neither helps, in the likeliest valley."""
         (best,) = self.across([best])
         for _ in range(MOST_ROUNDS):
-            best = self.pruned(best)
+            best = pruned(self, best)
             if self.part is not None and len(best.names) > LARGEST_SET:
                 break  # exchanged there
             rival = exchanged(self, best)

@@ -10,6 +10,7 @@ from host.catalogue import BY_NAME, UNKNOWN
 from host.diagnosis.exchange import exchanged
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.margins import FEW, LARGEST_SET, NAMING_MARGIN, ROUGH, SMALL, margin
+from host.diagnosis.pruning import pruned
 from host.diagnosis.search import Search
 
 PROMISING = 2  # forms beside each set that are fitted in earnest
@@ -27,15 +28,15 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
     for _ in range(1 if search.part is not None and _is_large(best) else MOST_ROUNDS):
         grown = _grown(search, best)
         # Of a large set each member costs a long fit to try without: that waits until all have joined.
-        leaner = grown if _is_large(best) else map(search.pruned, grown)
+        leaner = grown if _is_large(best) else (pruned(search, e) for e in grown)
         better = min(leaner, key=lambda e: e.bic, default=best)
         if better.bic > best.bic - margin(better):
             break
         best = better
     if not _is_large(best):
         return best
-    best = search.pruned(best)
-    return best if search.part is not None else exchanged(search, best)
+    best = pruned(search, best)
+    return best if search.part is not None else exchanged(search, search.completed(best))
 
 
 def unknown_in(explanation: Explanation) -> list[str]:

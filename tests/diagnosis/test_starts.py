@@ -14,7 +14,7 @@ from host.gauss_newton import Point
 from host.output_error import output_error
 from host.propagate import free_run, inputs_of
 from host.recording import Array
-from host.valleys import other_valleys, with_force_mirrored, with_poles_swapped
+from host.valleys import other_valleys, with_depth_lag_swapped, with_force_mirrored, with_poles_swapped
 
 AT_REST = np.array([0.0, 0.0, 0.0, 20.0])
 WEAKENED_AT = 31.3  # under a large plane angle, so that the recording can tell
@@ -62,6 +62,25 @@ def test_heave_that_turns_the_hull_and_a_pole_of_pitch_may_trade_places() -> Non
         run = free_run(one.parameters, AT_REST, inputs).outputs
         np.testing.assert_allclose(run[0], true[0], atol=2e-4)
         assert np.abs(run[1] - true[1]).max() > 0.01
+
+
+def test_heave_and_the_lag_of_a_depth_sensor_may_trade_places() -> None:
+    rows, structure = (
+        hidden_dive(duration=30.0),
+        structure_of(("depth_sensor_lag", "heave_pitch_rate_coupling")),
+    )
+    rows.rudder[:5] = 0.0  # from where a lagging reading begins
+    known = {**BASE, "heave_offset": 0.0, "pitch_offset": 0.0, "c_wq": 0.7, "depth_lag_time": 0.5}
+    point = Point(structure, np.array([known[n] for n in structure.names]), [AT_REST], np.zeros(4))
+    inputs = inputs_of(rows, structure)
+    true = free_run(point.parameters, AT_REST, inputs).outputs
+    (swapped,) = with_depth_lag_swapped(point)
+    assert swapped.parameters[0] == pytest.approx(-2.0)
+    assert swapped.parameters[-1] == pytest.approx(-1.0 / BASE["a1"])
+    run = free_run(swapped.parameters, AT_REST, inputs).outputs
+    np.testing.assert_allclose(run, true, atol=2e-4)
+    (again,) = with_depth_lag_swapped(swapped)
+    np.testing.assert_allclose(again.parameters, point.parameters, rtol=1e-9)
 
 
 @pytest.mark.parametrize(("b1", "mirrored"), [(0.5, -0.5), (-0.02, 0.394)])
