@@ -141,6 +141,11 @@ class Search:
             self.remember(found)
         self._polished.update(new)
 
+    def polished_near(self, rough: list[Explanation], bic: float) -> list[Explanation]:
+        """Those of them that may come near this BIC, fitted to the end."""
+        tasks: list[Task] = [("polished", (e,)) for e in rough if e.bic < bic + ROUGH]
+        return [self.remember(e) for e in self.workers.results(tasks)]
+
     def remember(self, explanation: Explanation) -> Explanation:
         """Keeps the better of two fits of one set."""
         known = self.tried.get(explanation.names)
@@ -235,8 +240,7 @@ class Search:
         """The leading sets with the free trim explained by as few of the offsets as will do."""
         free = [e for e in self.tried.values() if FREE_TRIM.name in e.names]
         free = sorted((e for e in free if not self._has_idle_member(e)), key=lambda e: e.bic)
-        rough = [e for e in free[: 2 * BEAM] if e.bic < free[0].bic + ROUGH]
-        polished = [self.remember(e) for e in self.workers.results([("polished", (e,)) for e in rough])]
+        polished = self.polished_near(free[: 2 * BEAM], free[0].bic)
         leading = min(polished, key=lambda e: e.bic)
         polished = [e for e in polished if e.bic < leading.bic + 2.0 * NAMING_MARGIN]
         if len(leading.names) > LARGEST_SET:
@@ -246,9 +250,7 @@ class Search:
             ways = [frozenset(way) for count in counts for way in combinations(OFFSETS, count)]
             tasks = [("retrimmed", (e, way)) for e in polished for way in ways]
             retrimmed = [self.remember(e) for e in self.workers.results(tasks)]
-            least = min(e.bic for e in [*explained, *retrimmed])
-            near = [e for e in retrimmed if e.bic < least + ROUGH]
-            explained += [self.remember(e) for e in self.workers.results([("polished", (e,)) for e in near])]
+            explained += self.polished_near(retrimmed, min(e.bic for e in [*explained, *retrimmed]))
             best = min(explained, key=lambda e: e.bic)
             if best.bic < leading.bic + margin(leading):
                 break

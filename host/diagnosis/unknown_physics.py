@@ -9,7 +9,7 @@ large as the search goes grows only in competition with these forms.
 from host.catalogue import BY_NAME, UNKNOWN
 from host.diagnosis.exchange import exchanged
 from host.diagnosis.explanation import Explanation
-from host.diagnosis.margins import FEW, LARGEST_SET, NAMING_MARGIN, ROUGH, SMALL, margin
+from host.diagnosis.margins import FEW, LARGEST_SET, NAMING_MARGIN, SMALL, margin
 from host.diagnosis.pruning import pruned
 from host.diagnosis.search import Search
 
@@ -83,8 +83,6 @@ def _grown(search: Search, best: Explanation) -> list[Explanation]:
             if gains[name] > margin(best):
                 chosen[best.names | {name}] = best, name
     grown = search.workers.results([search.growth(parent, name) for parent, name in chosen.values()])
-    least = min((e.bic for e in grown), default=0.0)
-    near = [e for e in grown if e.bic < least + ROUGH]
-    polished = search.workers.results([("polished", (e,)) for e in near])
+    polished = search.polished_near(grown, min((e.bic for e in grown), default=0.0))
     count = 2 if len(best.names) <= SMALL else 1
-    return [search.remember(e) for e in sorted(polished, key=lambda e: e.bic)[:count]]
+    return sorted(polished, key=lambda e: e.bic)[:count]
