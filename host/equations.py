@@ -56,7 +56,8 @@ class Chain:
     speed        u, m/s, measured where `is_speed_known` is 1; `speed_ratio` u / u0, on which forces depend;
     surge        u', m/s^2, of the measured speed
     command      rad, the plane as commanded, its mean over the sub-step; `earlier` the commands of the rows
-                 before, newest first; `change` rad, by which the command grows over the sub-step
+                 before, newest first; `change` rad, by which the command grows over the sub-step if it
+                 grows evenly: what has its mean and first moment
     elapsed      s from the row to the sub-step, `substep` its length
     plane        rad, the angle at which the plane acts
     heave, pitch, climb   terms added to w' (m/s^2), q' (rad/s^2), zeta' (m/s)
@@ -98,8 +99,8 @@ class Effect:
 
     force     adds to heave, pitch, climb or the rate of its own state; evaluated within each sub-step
     command   changes the command before the actuator, once a sub-step
-    actuator  (chain, held angle, sub-step s) -> (mean angle over the sub-step, next held angle);
-              needs a state of its own, which starts at the command
+    actuator  (chain, held angle, sub-step s) -> (mean angle over the sub-step, next held angle), and sets the
+              chain's change; needs a state of its own, which starts at the command
     plane     changes the angle at which the plane acts
     sense     changes what the sensors give
     follows   where its state follows something with a first-order lag: that, and the time constant's name
@@ -231,7 +232,6 @@ class Structure:
         for effect in self.effects:
             if effect.actuator is not None and effect.state is not None:
                 chain.plane, moved[effect.state] = effect.actuator(chain, chain.extra[effect.state], substep)
-                chain.change = ca.SX(0)  # smoothed away
         for effect in self.effects:
             if effect.plane is not None:
                 effect.plane(chain)

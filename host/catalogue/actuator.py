@@ -32,26 +32,38 @@ def _rate_limit(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:
     farthest = c.p["plane_rate"] * substep
     moved = limited(c.plane - held, farthest)
     share = ca.fmin(1, ca.fabs(c.plane - held) / farthest)  # of the sub-step that the plane is under way
+    c.change = moved * share * (3 - 2 * share)
     return held + moved - moved * share / 2, held + moved
 
 
 def _lag(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:
     """The mean over the sub-step, and the end: at the largest rate first where that is limited."""
-    time, away = c.p["lag_time"], c.plane - held
     if "plane_rate" in c.p:
-        rate = c.p["plane_rate"]
-        hurried = ca.fmax(0, ca.fmin(substep, ca.fabs(away) / rate - time))
-        moved = ca.sign(away) * rate * hurried
-    else:
-        hurried, moved = ca.SX(0), ca.SX(0)
+        return _hurried_lag(c, held, substep)
+    time, slope = c.p["lag_time"], c.change / substep
+    left = ca.exp(-substep / time)
+    away = held - (c.plane - c.change / 2 - slope * time)  # from the ramp that the plane ends up on
+    end = c.plane + c.change / 2 - slope * time + away * left
+    moment = time**2 * (1 - left) - substep * time * (1 + left) / 2
+    c.change += 12 * away * moment / substep**2
+    return c.plane - time * (end - held) / substep, end
+
+
+def _hurried_lag(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:
+    time, rate, away = c.p["lag_time"], c.p["plane_rate"], c.plane - held
+    hurried = ca.fmax(0, ca.fmin(substep, ca.fabs(away) / rate - time))
+    moved = ca.sign(away) * rate * hurried
     left = ca.exp((hurried - substep) / time)
     behind = (away - moved) * time * (1 - left) - moved * hurried / 2 + away * hurried
-    return c.plane - behind / substep, c.plane - (away - moved) * left
+    end = c.plane - (away - moved) * left
+    c.change = end - held
+    return c.plane - behind / substep, end
 
 
 def _backlash(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:  # noqa: ARG001
     half = c.p["backlash"] / 2
     moved = ca.fmax(c.plane - half, ca.fmin(c.plane + half, held))
+    c.change = ca.SX(0)
     return moved, moved
 
 

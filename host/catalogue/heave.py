@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from host.catalogue.switching import after
+from host.catalogue import weight
 from host.equations import Chain, Effect, Parameter
 
 
@@ -15,15 +15,15 @@ def _drag(c: Chain) -> None:
 
 
 def _buoyancy(c: Chain) -> None:
-    c.heave += c.p["c_w0"] * ca.cos(c.theta)
+    c.heave += weight.constant(c) * ca.cos(c.theta)
 
 
 def _compressibility(c: Chain) -> None:
-    c.heave += c.p["c_wz"] * (c.zeta - c.p["neutral_depth"]) * ca.cos(c.theta)
+    c.heave += weight.compressed(c) * ca.cos(c.theta)
 
 
 def _ballast(c: Chain) -> None:
-    c.heave += c.p["c_wb"] * ca.cos(c.theta) * after(c.time, c.p["ballast_time"])
+    c.heave += weight.ballast(c) * ca.cos(c.theta)
 
 
 def _acceleration(c: Chain) -> None:

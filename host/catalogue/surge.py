@@ -1,5 +1,8 @@
 """Forward speed, u' = ..."""
 
+import casadi as ca
+
+from host.catalogue.weight import net_weight
 from host.equations import Chain, Effect, Parameter
 
 
@@ -10,7 +13,8 @@ def _speed_loss(c: Chain) -> None:
     c.rates["speed_loss"] = (
         -change * (1 + c.speed_ratio) / 2 / c.p["speed_time"]
         - c.p["c_ud"] * (c.speed_ratio * c.plane) ** 2
-        - c.p["c_uq"] * c.w * c.q
+        # Both forces belong to the heave mass, which the surge mass is moved by.
+        - c.p["c_uq"] * (c.w * c.q + net_weight(c) * ca.sin(c.theta))
     )
     c.surge = c.surge + c.rates["speed_loss"] * (1 - is_known)
 
@@ -24,11 +28,11 @@ EFFECTS = (
                 name="speed_time", unit="s", lower=0.3, upper=1000, meaning="recovery time of the speed"
             ),
             Parameter(name="c_ud", unit="m/s^2/rad^2", lower=0, upper=500, meaning="drag of the plane"),
-            Parameter(name="c_uq", unit="1", lower=0, upper=20, meaning="heave and turning into surge"),
+            Parameter(name="c_uq", unit="1", lower=0, upper=20, meaning="heave mass over surge mass"),
         ),
         sentence="The speed falls in manoeuvres: damping falls with it, the plane's force with its square.",
-        equation="u' = -(u^2 - u0^2)/(2 u0 speed_time) - c_ud (u/u0)^2 delta^2 - c_uq w q; "
-        "a1, a2 ~ u; b1, b2 ~ u^2",
+        equation="u' = -(u^2 - u0^2)/(2 u0 speed_time) - c_ud (u/u0)^2 delta^2 - "
+        "c_uq (w q + net weight sin theta); a1, a2 ~ u; b1, b2 ~ u^2",
         manoeuvre="record the speed, or hold large plane angles for ten seconds and return to level",
         probes=((5.0, 0.0, 0.0), (30.0, 0.0, 0.0), (150.0, 0.0, 0.0)),
         sizes=("c_ud", "c_uq"),

@@ -178,3 +178,41 @@ def test_a_servo_with_a_lag_and_a_limited_rate_is_one_servo(substep: float) -> N
             plane += rows.step / fine * np.clip((command - plane) / lag, -rate, rate)
     assert np.ptp(np.diff(followed)) > 1.9 * rate * rows.step  # it was at its limit either way
     np.testing.assert_allclose(run.states[structure.states.index("lagged")], followed, atol=1e-4)
+
+
+@pytest.mark.parametrize("lag", [0.05, 0.1, 0.4])
+@pytest.mark.parametrize("delay", [0.0, 0.13, 0.25])
+def test_a_servo_lag_is_exact_behind_a_delay_however_coarse_the_rows(lag: float, delay: float) -> None:
+    rows, late = hidden_dive(duration=30.0), structure_of(("actuator_delay", "actuator_lag"))
+    values = np.array([*BASE.values(), 0.0, 0.0])
+    run = free_run(np.append(values, [delay, lag]), START, inputs_of(rows, late, 0.1))
+    fine = finer(rows)
+    commands = np.concatenate([np.full(round(delay / fine.step), rows.rudder[0]), fine.rudder])
+    moved = replace(fine, rudder=commands[: fine.time.size])
+    true = free_run(np.append(values, lag), START, inputs_of(moved, structure_of(("actuator_lag",))))
+    off = run.outputs - true.outputs[:, ::EACH]
+    # As if the plane were late by less than 2 ms.
+    rate = np.abs(np.gradient(true.outputs, fine.step, axis=1)).max(axis=1)
+    assert (np.abs(off).max(axis=1) < 2e-3 * rate).all()
+
+
+def test_a_rate_limit_is_exact_however_coarse_the_rows() -> None:
+    rows, structure = hidden_dive(duration=30.0), structure_of(("actuator_rate_limit",))
+    values = np.array([*BASE.values(), 0.0, 0.0, 1.1])
+    run = free_run(values, START, inputs_of(rows, structure, 0.1)).outputs
+    true = free_run(values, START, inputs_of(finer(rows), structure)).outputs[:, ::EACH]
+    assert np.abs(run - true).max() < 1e-3 * np.ptp(true, axis=1).min()
+
+
+def test_a_net_weight_drives_a_pitched_hull_along_its_axis() -> None:
+    # Where the speed has settled: 0 = -(u^2 - u0^2)/(2 u0 speed_time) - c_uq c_w0 sin theta.
+    still = hidden_dive(duration=60.0)
+    climb = replace(still, rudder=np.full(still.time.size, -0.2), speed=np.full(still.time.size, np.nan))
+    structure = structure_of(("speed_loss", "net_buoyancy"))
+    known = dict.fromkeys(structure.names, 0.0) | BASE
+    known |= {"speed_time": 3.0, "c_uq": 1.9, "c_w0": 0.05}
+    run = free_run(np.array([known[name] for name in structure.names]), START, inputs_of(climb, structure))
+    theta, lost = run.outputs[0, -1], run.states[structure.states.index("speed_loss"), -1]
+    u0 = BASE["u0"]
+    assert theta > 0.05
+    assert lost == pytest.approx((u0**2 - 2 * u0 * 3.0 * 1.9 * 0.05 * np.sin(theta)) ** 0.5 - u0, rel=1e-3)
