@@ -247,7 +247,7 @@ class Structure:
     def initial(self, x0: ca.SX, parameters: ca.SX, drive: ca.SX) -> ca.SX:
         """All states at the first row from the four of the base."""
         count = len(self.states) - len(STATES)
-        chain = self.chain(ca.vertcat(x0, ca.SX(count, 1)), parameters, drive, ca.SX(0))
+        chain = self.chain(ca.vertcat(x0, ca.SX(count, 1)), parameters, drive, drive[4])
         own = [effect.initial(chain) for effect in self.effects if effect.initial is not None]
         return ca.vertcat(x0, *own)
 

@@ -30,7 +30,7 @@ CATALOGUE: tuple[Effect, ...] = (
 )
 BY_NAME = {effect.name: effect for effect in CATALOGUE}
 UNKNOWN = {effect.name: effect for effect in unknown.FORMS}
-_TOOLS = (nuisance.FREE_TRIM, unknown.ANY_SMOOTH_FORCE, *moments.SCANS.values())
+_TOOLS = (nuisance.FREE_TRIM, nuisance.PLANE_BEFORE, unknown.ANY_SMOOTH_FORCE, *moments.SCANS.values())
 _ALL = BY_NAME | UNKNOWN | {effect.name: effect for effect in _TOOLS}
 ORDINARY = (
     "heave_pitch_rate_coupling",

@@ -14,6 +14,9 @@ def _delay(c: Chain) -> None:
     """Within the sub-step a late command may give way to the next: its mean and first moment are kept."""
     mean, change, ends = ca.SX(0), ca.SX(0), ca.SX(1)
     for lag, command in enumerate((c.command, *c.earlier)):
+        if "plane_before" in c.p:
+            is_before = c.time - c.elapsed - (lag - 0.5) * c.interval < 0
+            command = ca.if_else(is_before, c.p["plane_before"], command)
         begins = ca.fmax(0, ca.fmin(1, (c.p["delay"] - lag * c.interval - c.elapsed) / c.substep))
         mean += command * (ends - begins)
         change += command * 6 * (ends * (ends - 1) - begins * (begins - 1))
@@ -78,8 +81,9 @@ def _effectiveness(c: Chain) -> None:
     c.plane, c.change = c.plane * share, c.change * share
 
 
-def _at_command(c: Chain) -> ca.SX:
-    return c.command
+def _at_start(c: Chain) -> ca.SX:
+    """Settled at the command; where the recording begins, at that before if it is known."""
+    return ca.if_else(c.time > 0, c.command, c.p.get("plane_before", c.command))
 
 
 EFFECTS = (
@@ -130,7 +134,7 @@ EFFECTS = (
         sizes=(),
         actuator=_rate_limit,
         state="rate_limited",
-        initial=_at_command,
+        initial=_at_start,
     ),
     Effect(
         name="actuator_lag",
@@ -142,7 +146,7 @@ EFFECTS = (
         probes=((0.1,), (0.4,), (1.2,)),
         actuator=_lag,
         state="lagged",
-        initial=_at_command,
+        initial=_at_start,
         is_common=True,
     ),
     Effect(
@@ -156,7 +160,7 @@ EFFECTS = (
         scales=("rudder",),
         actuator=_backlash,
         state="slack",
-        initial=_at_command,
+        initial=_at_start,
     ),
     Effect(
         name="rudder_stall",

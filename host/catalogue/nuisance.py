@@ -1,4 +1,4 @@
-"""A constant force and moment of whatever cause: no entry of the catalogue, but a tool of the search."""
+"""What hides the physics left out while it is unknown: no catalogue entries, but tools of the search."""
 
 from host.equations import Chain, Effect, Parameter
 
@@ -26,3 +26,23 @@ FREE_TRIM = Effect(
 
 Which of the catalogue's offsets they stand for is asked once the motion is explained.
 """
+
+PLANE_BEFORE = Effect(
+    name="plane_before",
+    slot="actuator",
+    parameters=(
+        Parameter(name="plane_before", unit="rad", lower=-2, upper=2, meaning="plane before the recording"),
+    ),
+    sentence="The plane had another angle before the recording began.",
+    equation="command(t < 0) = plane_before",
+    manoeuvre="a recording that begins with the plane at rest",
+    probes=((0.0,),),
+    sizes=(),
+    is_common=True,
+)
+"""Where a recording begins as the plane is put over, a servo, a delay or play still have it elsewhere."""
+
+
+def has_memory(effect: Effect) -> bool:
+    """Whether the plane depends on commands that were given before."""
+    return effect.actuator is not None or effect.lags

@@ -203,7 +203,7 @@ def _slots(
             shares[named(name).slot] += float(np.clip(worth, 0.0, MOST_WORTH))
     elif verdict != "no_mismatch":
         for name, gain in search.gains(best).items():
-            slot = BY_NAME[name].slot
+            slot = named(name).slot
             shares[slot] = max(shares[slot], gain if np.isfinite(gain) else 0.0)
     total = sum(shares.values())
     return {slot: share / total for slot, share in shares.items()} if total > 0.0 else shares

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from host.catalogue import BY_NAME
+from host.catalogue.nuisance import PLANE_BEFORE
 from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import Diagnosis
 from host.diagnosis.explanation import Explanation
@@ -107,6 +108,7 @@ def write_extended_model(found: Diagnosis, vehicle: Vehicle, path: Path) -> None
             },
         }
         for effect in fit.structure.effects
+        if effect is not PLANE_BEFORE  # which is of the recording, not of the vehicle
     ]
     model = model_of(
         found.recordings,

@@ -4,8 +4,8 @@ Effects are never added one at a time for good: sets are carried side by side, e
 re-estimated with the base whenever one joins, members that no longer pay are dropped, and each member of the
 best set is exchanged for every other effect that might do its work. Each effect is fitted alone; what it
 could gain beside others is predicted by one Gauss-Newton step from there, and the promising ones are fitted.
-Where few effects leave much, or many were needed, what every vehicle has is fitted together and pruned: of
-many that act at once, each may look idle or be mistaken until the others are there.
+Where one effect leaves much, or many were needed, what every vehicle has is fitted together and pruned
+(host.diagnosis.together).
 """
 
 from collections.abc import Callable, Iterable
@@ -13,14 +13,15 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from math import inf
 
-from host.catalogue import CATALOGUE, ORDINARY, named
+from host.catalogue import CATALOGUE, named
 from host.catalogue.kin import OFFSETS
-from host.catalogue.nuisance import FREE_TRIM
+from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE, has_memory
 from host.diagnosis.exchange import exchanged
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.margins import FEW, LARGEST_SET, NAMING_MARGIN, ROUGH, SMALL, margin
+from host.diagnosis.margins import FEW, LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN, ROUGH, SMALL, margin
 from host.diagnosis.pruning import pruned
+from host.diagnosis.together import completed, together
 from host.diagnosis.workers import Task, Workers
 from host.recording import Array
 
@@ -28,7 +29,6 @@ BEAM = 4  # single effects carried on
 FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
 NARROW = 2  # of larger sets, which cost most and of which there are most
 PROMISING = 6
-NEAR = 1.15  # times the noise floor: little is left, and gains are well predicted
 MOST_ROUNDS = 4
 
 Progress = Callable[[str], None]
@@ -42,6 +42,7 @@ class Search:
           random forces where the root has them
     part  the search over an excerpt of the recordings that this one goes on from
     rivals  sets that were fitted in an exchange
+    joint   sets with all that every vehicle has
     """
 
     fitter: Fitter
@@ -52,6 +53,7 @@ class Search:
     part: "Search | None" = None
     tried: dict[Names, Explanation] = field(default_factory=dict)
     rivals: set[Names] = field(default_factory=set)
+    joint: set[Names] = field(default_factory=set)
     _shrunk: set[Names] = field(default_factory=set)  # those fitted from a larger set
     _polished: set[Names] = field(default_factory=set)  # those of them fitted to the end
 
@@ -65,7 +67,7 @@ class Search:
             settled = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
             return self._settled(min(settled, key=lambda e: e.bic))
         for size in range(1, LARGEST_SET + 1):
-            if size > SMALL and self._ordinary_suffices(beam[0]):
+            if self._needs_many(beam[0], size) and together(self, beam[0]) is not None:
                 break
             grown = self._grown(beam, size)
             best_before = min(e.bic for e in beam)
@@ -73,18 +75,7 @@ class Search:
             if not beam or beam[0].bic > best_before - margin(beam[0]):
                 break
         self.on_progress("settling")
-        return self.completed(self._settled(self._retrimmed()))
-
-    def completed(self, best: Explanation) -> Explanation:
-        """A set of many, or what is left of it when all that every vehicle has joins at once.
-
-        One at a time they may promise nothing, where the set is bent to do without them.
-        """
-        if len(best.names) <= SMALL or {*ORDINARY} <= best.names or self.root.fit.has_process_noise:
-            return best
-        self.on_progress("what every vehicle has beside it")
-        (joint,) = self.across([self._with_ordinary(best)])
-        return min(best, pruned(self, joint), key=lambda e: e.bic)
+        return completed(self, self._settled(self._retrimmed()))
 
     def without(self, best: Explanation, name: str) -> Explanation:
         """The set less one member."""
@@ -157,24 +148,11 @@ class Search:
         """Each in its likeliest valley."""
         return [self.remember(e) for e in self.workers.results([("across", (e,)) for e in explanations])]
 
-    def _ordinary_suffices(self, leading: Explanation) -> bool:
-        """Whether all that every vehicle has, tried if the leading small set leaves much, leaves little."""
-        if self.root.fit.has_process_noise or self.fitter.excess(leading.fit) < NEAR:
+    def _needs_many(self, leading: Explanation, size: int) -> bool:
+        """Whether it is time, once, to try all that every vehicle has: far too much is left, or too much."""
+        if size == 1 or self.joint or self.root.fit.has_process_noise:
             return False
-        family = self.root.names | {*ORDINARY}
-        fitted = [e for e in self.tried.values() if self.root.names <= e.names <= family]
-        joint = min(fitted, key=lambda e: e.bic)
-        self.on_progress("what every vehicle has")
-        joint = self._with_ordinary(joint)
-        if joint.bic > leading.bic:
-            return False
-        return self.fitter.excess(pruned(self, joint).fit) < NEAR
-
-    def _with_ordinary(self, explanation: Explanation) -> Explanation:
-        for name in ORDINARY:
-            if name not in explanation.names:
-                explanation = self.fitter.grown(explanation, name, self.values(name))
-        return self.remember(self.fitter.polished(explanation))
+        return self.fitter.excess(leading.fit) > (MUCH if size <= SMALL else LITTLE)
 
     def _parents(self, grown: list[Explanation]) -> list[Explanation]:
         """The best sets, as far as they explain a fair part of what the very best does."""
@@ -208,7 +186,7 @@ class Search:
         gains = self.gains(parent, is_leading)
         best = sorted(gains, key=lambda name: -gains[name])[: PROMISING if size == 2 else FEW]
         worth = {name for name in best if gains[name] > NAMING_MARGIN}
-        is_far = size <= 2 and self.fitter.excess(parent.fit) > NEAR
+        is_far = size <= 2 and self.fitter.excess(parent.fit) > LITTLE
         is_far &= not self.root.fit.has_process_noise
         return [name for name in others if name in worth or (is_far and named(name).is_common)]
 
@@ -265,6 +243,12 @@ class Search:
 
 
 def _candidates(parent: Explanation) -> list[str]:
-    """What may join a set: the offsets only once the free trim, which does their work, has gone."""
+    """What may join a set: the offsets only once the free trim, which does their work, has gone.
+
+    And where the plane was before, once it matters.
+    """
     barred = OFFSETS if FREE_TRIM.name in parent.names else ()
-    return [e.name for e in CATALOGUE if e.name not in parent.names and e.name not in barred]
+    candidates = [e.name for e in CATALOGUE if e.name not in parent.names and e.name not in barred]
+    if PLANE_BEFORE.name not in parent.names and any(has_memory(named(name)) for name in parent.names):
+        candidates.append(PLANE_BEFORE.name)
+    return candidates

@@ -12,6 +12,7 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.margins import FEW, LARGEST_SET, NAMING_MARGIN, SMALL, margin
 from host.diagnosis.pruning import pruned
 from host.diagnosis.search import Search
+from host.diagnosis.together import completed
 
 PROMISING = 2  # forms beside each set that are fitted in earnest
 FAIR_PART = 0.3  # of what a member was worth, that a form in its place must promise: predictions are local
@@ -36,7 +37,7 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
     if not _is_large(best):
         return best
     best = pruned(search, best)
-    return best if search.part is not None else exchanged(search, search.completed(best))
+    return best if search.part is not None else exchanged(search, completed(search, best))
 
 
 def unknown_in(explanation: Explanation) -> list[str]:

@@ -216,3 +216,31 @@ def test_a_net_weight_drives_a_pitched_hull_along_its_axis() -> None:
     u0 = BASE["u0"]
     assert theta > 0.05
     assert lost == pytest.approx((u0**2 - 2 * u0 * 3.0 * 1.9 * 0.05 * np.sin(theta)) ** 0.5 - u0, rel=1e-3)
+
+
+MEMORY = ("actuator_delay", "actuator_rate_limit", "actuator_lag", "actuator_backlash")
+
+
+@pytest.mark.parametrize("names", [*((name,) for name in MEMORY), MEMORY])
+def test_the_plane_before_the_recording_is_where_delay_servo_and_play_begin(names: tuple[str, ...]) -> None:
+    rows, lead = hidden_dive(duration=30.0), 20
+    known = BASE | {"delay": 0.25, "plane_rate": 0.5, "lag_time": 0.4, "backlash": 0.04, "plane_before": 0.0}
+    known |= {"heave_offset": 0.0, "pitch_offset": 0.0}
+    at_rest = np.array([0.0, 0.0, 0.0, 20.0])
+
+    def run(rows: Recording, *more: str) -> np.ndarray:  # type: ignore[type-arg]
+        structure = structure_of((*names, *more))
+        values = np.array([known[name] for name in structure.names])
+        return free_run(values, at_rest, inputs_of(rows, structure)).outputs
+
+    blank = np.full(rows.time.size + lead, np.nan)
+    begun = replace(
+        rows, time=rows.step * np.arange(blank.size), rudder=np.append(np.zeros(lead), rows.rudder),
+        depth=blank, pitch=blank, speed=blank, pitch_rate=blank,
+    )  # fmt: skip
+    cut = run(rows, "plane_before")
+    np.testing.assert_allclose(cut, run(begun)[:, lead:], atol=1e-9)
+    assert np.abs(cut - run(rows)).max() > 1e-3
+    # A later stretch of a recording begins as the plane was commanded, not as it was before the recording.
+    later = replace(rows, time=rows.time + 100.0)
+    np.testing.assert_allclose(run(later, "plane_before"), run(later), atol=1e-9)

@@ -12,6 +12,7 @@ from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.pruning import pruned
 from host.diagnosis.search import Search
+from host.diagnosis.together import completed
 from host.diagnosis.workers import Workers
 from host.gauss_newton import Point
 from host.output_error import output_error
@@ -53,7 +54,7 @@ def test_what_every_vehicle_has_joins_at_once() -> None:
     with Workers(fitter, 1) as workers:
         search = Search(fitter, workers, said.append, fitter.base, fitter.trimmed())
         search.remember(wrong)
-        found = search.completed(wrong)
+        found = completed(search, wrong)
     assert said == ["what every vehicle has beside it"]
     assert found.names == names
     assert found.bic < wrong.bic

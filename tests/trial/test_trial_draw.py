@@ -12,6 +12,7 @@ from tools.trial.draw import FOREIGN_MISFIT, MISFIT, draw
 from tools.trial.hidden import KINDS, STRANGERS, Setting, draw_hidden
 from tools.trial.linear import free_run
 from tools.trial.outing import draw_outing, with_amplitude
+from tools.trial.usual import SHARES, draw_usual
 from tools.trial.vehicle import draw_vehicle
 from tools.trial.voyage import sail
 
@@ -96,3 +97,21 @@ def test_a_replayed_run_is_the_same_run() -> None:
     setting = Setting(vehicle=vehicle, command=0.1, pitch=0.2, duration_s=60.0, step_s=scenario.step_s)
     flown = sail(scenario, 1, (), setting)
     assert np.array_equal(sail(scenario, 1, (), setting, flown.command).depth, flown.depth)
+
+
+@pytest.mark.long
+def test_what_is_hidden_can_be_seen_beside_all_that_real_vehicles_have() -> None:
+    drawn = draw(31, 8, Card("one", ("net_buoyancy",)), has_usual=True).answer
+    assert drawn.usual == [*SHARES]
+    assert drawn.misfits["net_buoyancy"] >= MISFIT[0]
+    assert drawn.coefficients["large_angle_restoring"] == {"restoring_share": pytest.approx(1.0)}
+    plain = draw(31, 8, Card("one", ("net_buoyancy",))).answer
+    assert plain.usual == []
+    assert plain.floor.pitch_rad != drawn.floor.pitch_rad
+
+
+def test_a_usual_effect_that_is_hidden_is_not_drawn_twice() -> None:
+    rng = np.random.default_rng(1)
+    setting = Setting(vehicle=draw_vehicle(rng), command=0.1, pitch=0.2, duration_s=60.0, step_s=0.02)
+    names = [effect.name for effect in draw_usual(rng, setting, ("actuator_lag", "net_buoyancy"))]
+    assert names == [name for name in SHARES if name != "actuator_lag"]

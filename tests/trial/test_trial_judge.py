@@ -133,3 +133,15 @@ def test_coefficients_count_only_where_the_whole_truth_was_named_and_have_a_devi
     lost = effect("trim_moment")
     lost["coefficients"]["c_q0"] = {"value": 0.02, "std": None, "unit": "1"}
     assert not judged(answer(), lost).effect_coefficients
+
+
+def test_what_every_vehicle_has_may_be_named_or_not() -> None:
+    laden = answer(usual=["actuator_lag", "heave_quadratic_drag"])
+    found = judged(laden, effect("heave_quadratic_drag"), effect("trim_moment"))
+    assert found.named == ["trim_moment"]
+    assert found.is_first
+    assert found.is_exact
+    assert found.is_slot_right is None
+    assert judged(laden, effect("trim_moment")).is_exact
+    assert not judged(laden, effect("munk_moment"), effect("trim_moment")).is_first
+    assert judged(answer("none", (), usual=["actuator_lag"]), effect("actuator_lag")).is_exact

@@ -20,6 +20,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="recordings (default 300); of a trial with more, the first N",
     )
     parser.add_argument("--seed", type=int, help="repeats a trial; without it nobody knows the answers")
+    parser.add_argument(
+        "--usual", action="store_true", help="every vehicle also has what real ones have: drag, a lag, ..."
+    )
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes at once (default 2)")
     parser.add_argument("--quiet", action="store_true", help="no progress")
 
@@ -47,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
         if digest is None:
             seed = int.from_bytes(os.urandom(6)) if args.seed is None else args.seed
             with stage("drawing vehicles", args.count) as step:
-                digest = write_trial(folder, seed, args.count, args.jobs, step)
+                digest = write_trial(folder, seed, args.count, args.jobs, step, args.usual)
         print(f"answers sealed: SHA-256 {digest}  {folder / SEALED}", flush=True)
         paths = recordings(folder)[: args.count]
         with stage("diagnosing", len(paths)) as step:
@@ -67,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     beside = {
         path: answer
         for path, answer in zip(paths, answers, strict=True)
-        if answer.case != "outside" and not names_just(said.get(answer.name), answer.hidden)
+        if answer.case != "outside" and not names_just(said.get(answer.name), answer)
     }
     with (
         stages(args.quiet) as stage,
@@ -89,6 +92,7 @@ def run(args: argparse.Namespace) -> int:
     result = score(judged)
     print_score(result, Console(width=None if sys.stdout.isatty() else 110))
     write_json(folder / "trial.json", seed, digest, result, judged)
-    write_page(folder / "trial.html", seed, digest, result, judged)
+    usual = sorted({name for answer in answers for name in answer.usual})
+    write_page(folder / "trial.html", seed, digest, result, judged, usual)
     print(f"report: {folder / 'trial.html'}\nfigures: {folder / 'trial.json'}")
     return 1 if any(rate.is_met is False for rate in result.rates) else 0

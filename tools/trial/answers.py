@@ -3,7 +3,7 @@
 import gzip
 import hashlib
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 SEALED = "answers.json.gz"
@@ -29,6 +29,7 @@ class Floor:
 class Answer:
     """What one recording hides.
 
+    usual         what this vehicle has beside it as every real one does, and what may be named or not
     misfits       by effect: chi2 that remains without it, all coefficients fitted anew
     coefficients  by effect, then by the catalogue's name; empty where the forms differ
     """
@@ -43,6 +44,7 @@ class Answer:
     coefficients: dict[str, dict[str, float]]
     outing: dict[str, float | str | bool]
     floor: Floor
+    usual: list[str] = field(default_factory=list)
 
     @property
     def name(self) -> str:

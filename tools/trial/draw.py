@@ -21,6 +21,7 @@ from tools.trial.sizing import (
     strength_for,
     yardstick,
 )
+from tools.trial.usual import draw_usual
 from tools.trial.vehicle import draw_vehicle, log_uniform
 from tools.trial.voyage import Voyage, sail
 
@@ -45,15 +46,18 @@ class Drawn:
     answer: Answer
 
 
-def draw(seed: int, number: int, card: Card) -> Drawn:
-    """Recording `number` of a trial: vehicles and outings are drawn until all on the card can be seen."""
+def draw(seed: int, number: int, card: Card, has_usual: bool = False) -> Drawn:
+    """Recording `number` of a trial: vehicles and outings are drawn until all on the card can be seen.
+
+    has_usual    the vehicle also has all that real ones have, and what is on the card is seen beside it
+    """
     for attempt in range(MOST_ATTEMPTS):
         rng = np.random.default_rng([seed, 4, number, attempt])
         if card.names and attempt > 0 and attempt % PATIENCE == 0:
             family = tuple(STRANGERS if card.case == "outside" else KINDS)
             names = rng.choice(family, len(card.names), replace=False).tolist()
             card = Card(card.case, tuple(names))
-        drawn = _attempt(rng, number, card)
+        drawn = _attempt(rng, number, card, has_usual)
         if drawn is not None:
             return drawn
     raise CannotDraw(
@@ -61,7 +65,7 @@ def draw(seed: int, number: int, card: Card) -> Drawn:
     )
 
 
-def _attempt(rng: np.random.Generator, number: int, card: Card) -> Drawn | None:
+def _attempt(rng: np.random.Generator, number: int, card: Card, has_usual: bool) -> Drawn | None:
     vehicle = draw_vehicle(rng)
     outing = draw_outing(rng, vehicle, near_surface="surface_waves" in card.names)
     seed = int(rng.integers(2**31))
@@ -85,23 +89,25 @@ def _attempt(rng: np.random.Generator, number: int, card: Card) -> Drawn | None:
         if effect is None:
             return None
         hidden = (*hidden, effect)
+    usual = draw_usual(rng, setting, card.names) if has_usual else ()
+    acting = (*hidden, *usual)
     try:
-        voyage = sail(outing.scenario, seed, hidden, setting)
+        voyage = sail(outing.scenario, seed, acting, setting)
     except ScenarioError:
         return None
     if not is_ordinary(voyage):
         return None
     misfits = {}
-    if len(hidden) == 1:
+    if len(acting) == 1:
         beyond = hidden[0].is_foreign
         misfits = {hidden[0].name: linear_misfit(voyage, outing, setting, noise, beyond)}
-    for effect in hidden if len(hidden) > 1 else ():
-        others = tuple(other for other in hidden if other is not effect)
+    for effect in hidden if len(acting) > 1 else ():
+        others = tuple(other for other in acting if other is not effect)
         misfit = misfit_beside(voyage, outing, seed, others, setting, noise, MISFIT[0])
         if misfit < MISFIT[0]:
             return None
         misfits[effect.name] = misfit
-    return _written(number, card, outing, seed, setting, noise, hidden, voyage, misfits)
+    return _written(number, card, outing, seed, setting, noise, hidden, usual, voyage, misfits)
 
 
 def _sized_to_pitch(
@@ -155,6 +161,7 @@ def _written(
     setting: Setting,
     noise: Yardstick,
     hidden: tuple[Hidden, ...],
+    usual: tuple[Hidden, ...],
     voyage: Voyage,
     misfits: dict[str, float],
 ) -> Drawn:
@@ -165,18 +172,19 @@ def _written(
     ):
         if not is_there:
             del table[column]
-    sea = Plant(replace(outing.scenario, effects=switched(hidden, setting)), seed).sea
+    sea = Plant(replace(outing.scenario, effects=switched((*hidden, *usual), setting)), seed).sea
     phase = (sin(sea.internal_phase), cos(sea.internal_phase))
     excitation = outing.scenario.excitation
     answer = Answer(
         number=number,
         case=card.case,
         hidden=[effect.name for effect in hidden],
+        usual=[effect.name for effect in usual],
         slots=[effect.slot for effect in hidden],
         sizes={effect.name: effect.size(setting) for effect in hidden},
         misfits={name: round(misfit, 1) for name, misfit in misfits.items()},
         base=setting.vehicle.coefficients,
-        coefficients={effect.name: true_coefficients(effect, setting, phase) for effect in hidden},
+        coefficients={effect.name: true_coefficients(effect, setting, phase) for effect in (*hidden, *usual)},
         outing={
             "mass_kg": round(setting.vehicle.hull.mass, 2),
             "length_m": round(setting.vehicle.length, 2),

@@ -37,7 +37,8 @@ class Coefficient:
 class Judged:
     """What was hidden, what was said, and how that compares. None where a question does not apply.
 
-    first         the effect named first, or "nothing"
+    named         what was named but for what every real vehicle has, where this one has it
+    first         the effect named first of those, or "nothing"
     is_first      the (or one) hidden effect was named first
     is_in_class   it was, or stands in the class of at most three that the first one is said to belong to
     are_named     all that is hidden was named
@@ -84,9 +85,13 @@ class Judged:
         return min(self.misfits.values(), default=0.0)
 
 
-def names_just(diagnosis: dict[str, Any] | None, hidden: list[str]) -> bool:
-    """Whether a diagnosis names all that is hidden and nothing else."""
-    return diagnosis is not None and {effect["name"] for effect in diagnosis["effects"]} == set(hidden)
+def names_just(diagnosis: dict[str, Any] | None, answer: Answer) -> bool:
+    """Whether a diagnosis names all that is hidden and nothing that the vehicle has not."""
+    return diagnosis is not None and set(_named(diagnosis, answer)) == set(answer.hidden)
+
+
+def _named(diagnosis: dict[str, Any], answer: Answer) -> list[str]:
+    return [effect["name"] for effect in diagnosis["effects"] if effect["name"] not in answer.usual]
 
 
 def judge(
@@ -105,12 +110,12 @@ def judge(
     true_heldout  held-out errors of a fit that was told what is hidden; not needed where just that was named
     """
     effects = [] if diagnosis is None else diagnosis["effects"]
-    named = [effect["name"] for effect in effects]
+    named = [] if diagnosis is None else _named(diagnosis, answer)
     classes = {effect["name"]: {effect["name"], *effect["indistinguishable_from"]} for effect in effects}
     stated = {name: members for name, members in classes.items() if len(members) <= LARGEST_CLASS}
     hidden, first = set(answer.hidden), named[0] if named else NOTHING
     is_known = answer.case in ("one", "two")
-    is_exact = names_just(diagnosis, answer.hidden) and answer.case != "outside"
+    is_exact = names_just(diagnosis, answer) and answer.case != "outside"
     verdict = "failed" if diagnosis is None else str(diagnosis["verdict"])
     slots = {} if diagnosis is None else diagnosis["location"]["slots"]
     reached = named + [name for members in stated.values() for name in members]
@@ -127,7 +132,7 @@ def judge(
         are_named=hidden <= set(named) if is_known else None,
         are_in_class=hidden <= set(reached) if is_known else None,
         is_exact=is_exact,
-        is_slot_right=_top(slots) in answer.slots if answer.case != "none" else None,
+        is_slot_right=_top(slots) in answer.slots if answer.hidden and not answer.usual else None,
         admits=verdict in ("partly_explained", "unexplained"),
         over_floor=_over_floor(answer, recorded, diagnosis, "extended"),
         base_over_floor=_over_floor(answer, recorded, diagnosis, "base"),
@@ -199,7 +204,7 @@ def _effect_coefficients(answer: Answer, effects: list[dict[str, Any]]) -> list[
 
 def _base_coefficients(answer: Answer, model: dict[str, Any] | None) -> list[Coefficient]:
     # With a varying speed these vary too, and which speed they belong to is a matter of words.
-    if model is None or "speed_loss" in answer.hidden:
+    if model is None or "speed_loss" in (*answer.hidden, *answer.usual):
         return []
     found = []
     for name, truth in answer.base.items():

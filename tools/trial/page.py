@@ -70,8 +70,10 @@ def write_json(path: Path, seed: int, digest: str, result: Score, judged: list[J
     path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
-def write_page(path: Path, seed: int, digest: str, result: Score, judged: list[Judged]) -> None:
-    """trial.html."""
+def write_page(
+    path: Path, seed: int, digest: str, result: Score, judged: list[Judged], usual: list[str]
+) -> None:
+    """trial.html. `usual` is what every vehicle has beside what is hidden."""
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent), autoescape=select_autoescape(default=True)
     )
@@ -89,6 +91,7 @@ def write_page(path: Path, seed: int, digest: str, result: Score, judged: list[J
         columns=columns,
         matrix=matrix,
         strangers=tuple(STRANGERS),
+        usual=usual,
         bar=bar,
         percent=_percent,
         wrong=sorted(wrong, key=lambda j: -j.weakest_misfit),

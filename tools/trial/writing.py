@@ -14,7 +14,9 @@ from tools.trial.draw import draw
 RECORDINGS = "recordings"
 
 
-def write_trial(folder: Path, seed: int, count: int, jobs: int, on_drawn: Callable[[], None]) -> str:
+def write_trial(
+    folder: Path, seed: int, count: int, jobs: int, on_drawn: Callable[[], None], has_usual: bool = False
+) -> str:
     """Writes `count` recordings of a seed and the sealed answers; gives the SHA-256 of the answers."""
     (folder / RECORDINGS).mkdir(parents=True, exist_ok=True)
     for stale in recordings(folder):
@@ -23,7 +25,7 @@ def write_trial(folder: Path, seed: int, count: int, jobs: int, on_drawn: Callab
     answers = []
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         drawing = [
-            pool.submit(_write_one, folder, seed, number, card)
+            pool.submit(_write_one, folder, seed, number, card, has_usual)
             for number, card in enumerate(deal(seed, count), start=1)
         ]
         for drawn in as_completed(drawing):
@@ -37,7 +39,7 @@ def recordings(folder: Path) -> list[Path]:
     return sorted((folder / RECORDINGS).glob("*.csv"))
 
 
-def _write_one(folder: Path, seed: int, number: int, card: Card) -> Answer:
-    drawn = draw(seed, number, card)
+def _write_one(folder: Path, seed: int, number: int, card: Card, has_usual: bool) -> Answer:
+    drawn = draw(seed, number, card, has_usual)
     write_csv(folder / RECORDINGS / f"{recording_name(number)}.csv", drawn.table)
     return drawn.answer

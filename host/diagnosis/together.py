@@ -1,0 +1,72 @@
+"""What every vehicle has, fitted at once.
+
+Of many effects that act together each may look idle, or be mistaken for another, until the rest are there;
+and a search that carries sets side by side costs most where sets are large. So where one effect leaves much,
+all that every vehicle has joins it, then what else promises most, and what does not pay is dropped at last.
+"""
+
+from typing import TYPE_CHECKING
+
+from host.catalogue import ORDINARY
+from host.catalogue.kin import OFFSETS
+from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.margins import FEW, LITTLE, SMALL, margin
+from host.diagnosis.pruning import pruned
+from host.diagnosis.workers import Task
+
+if TYPE_CHECKING:
+    from host.diagnosis.search import Search
+
+MOST_BESIDE = 3  # effects beside those that every vehicle has
+
+
+def together(search: "Search", leading: Explanation) -> Explanation | None:
+    """The leading set with all that every vehicle has, and more if need be, pruned; None if much is left."""
+    search.on_progress("what every vehicle has")
+    best = with_ordinary(search, leading)
+    for count in range(MOST_BESIDE + 1):
+        if search.fitter.excess(best.fit) < LITTLE:
+            best = pruned(search, best)
+            return best if best.bic < leading.bic else None
+        if count == MOST_BESIDE:
+            break
+        found = search.workers.results(_more(search, best))
+        better = min(search.polished_near(found, min(e.bic for e in found)), key=lambda e: e.bic)
+        if better.bic > best.bic - margin(better):
+            break
+        best = better
+        search.joint.add(best.names)
+    return None
+
+
+def completed(search: "Search", best: Explanation) -> Explanation:
+    """A set of many, or what is left of it when all that every vehicle has joins at once.
+
+    One at a time they may promise nothing, where the set is bent to do without them.
+    """
+    is_left = any(best.names - {*OFFSETS} <= names for names in search.joint)
+    if len(best.names) <= SMALL or is_left or search.root.fit.has_process_noise:
+        return best
+    search.on_progress("what every vehicle has beside it")
+    (joint,) = search.across([with_ordinary(search, best)])
+    return min(best, pruned(search, joint), key=lambda e: e.bic)
+
+
+def with_ordinary(search: "Search", explanation: Explanation) -> Explanation:
+    """The set with all that every vehicle has, whatever the plane did before the recording."""
+    for name in (*ORDINARY, PLANE_BEFORE.name):
+        if name not in explanation.names:
+            explanation = search.fitter.grown(explanation, name, search.values(name))
+    search.joint.add(explanation.names)
+    return search.remember(search.fitter.polished(explanation))
+
+
+def _more(search: "Search", best: Explanation) -> list[Task]:
+    """The set with one of the most promising effects more, or with an offset in place of the free trim."""
+    gains = search.gains(best)
+    promising = sorted(gains, key=lambda name: -gains[name])[:FEW]
+    tasks = [search.growth(best, name) for name in promising]
+    if FREE_TRIM.name in best.names:
+        tasks += [("retrimmed", (best, frozenset({name}))) for name in OFFSETS]
+    return tasks
