@@ -34,7 +34,8 @@ def covariance_within(fit: Fit) -> Array:
     M = fit.information[np.ix_(free, free)]
     inverse = _safe_inverse(M)
     if not all(is_white(e) for e in fit.whitened):
-        inverse = inverse @ _coloured_information(fit) @ inverse
+        half = inverse @ _root(_coloured_information(fit))
+        inverse = half @ half.T  # no variance comes out negative, however little the recording tells
     full = np.zeros((free.size, free.size))
     full[np.ix_(free, free)] = inverse
     return full
@@ -47,6 +48,13 @@ def _safe_inverse(M: Array) -> Array:
     values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
     values = np.maximum(values, 1e-14)
     return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))
+
+
+def _root(B: Array) -> Array:
+    """R with R R^T = B, what is negative in B by rounding left out."""
+    scale = np.sqrt(np.clip(np.diag(B), 1e-100, None))
+    values, vectors = np.linalg.eigh(B / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def _coloured_information(fit: Fit) -> Array:

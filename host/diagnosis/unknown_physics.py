@@ -2,8 +2,8 @@
 
 Few entries of a catalogue can follow nearly anything: drag and a current that cancels a buoyancy are the drag
 on one side of a keel. What gives them away is that one form of unknown physics (host.catalogue.unknown)
-explains the recording better, and with it some of them are no longer needed. For the same reason a set as
-large as the search goes grows only in competition with these forms.
+explains the recording better, and with it some of them are no longer needed. For the same reason the set that
+the search found grows further only in competition with these forms.
 """
 
 from host.catalogue import BY_NAME, UNKNOWN
@@ -21,10 +21,7 @@ MOST_TOLD = 3  # coefficients that a sentence can hold
 
 
 def with_unknown(search: Search, best: Explanation) -> Explanation:
-    """The best explanation with forms of unknown physics in it, and more effects beside those of a large set.
-
-    Either must pay as any effect does.
-    """
+    """The best explanation with forms of unknown physics in it, or more effects, if these pay."""
     search.on_progress("physics outside the catalogue")
     for _ in range(1 if search.part is not None and _is_large(best) else MOST_ROUNDS):
         grown = _grown(search, best)
@@ -64,8 +61,8 @@ def _is_large(explanation: Explanation) -> bool:
 def _grown(search: Search, best: Explanation) -> list[Explanation]:
     """The set with a form more, beside all its members or in the place of one: the two best.
 
-    A large set with another effect more, too, and so any whose search saw an excerpt only. In the place of
-    one of many members a form says little.
+    And with another effect more, which with the free trim in its place may have promised nothing. In the
+    place of one of many members a form says little.
     """
     parents = [best]
     if not _is_large(best):
@@ -78,11 +75,10 @@ def _grown(search: Search, best: Explanation) -> list[Explanation]:
         likely = sorted((name for name in gains if gains[name] > least), key=lambda name: -gains[name])
         for name in likely[: PROMISING if len(best.names) <= SMALL else 1]:
             chosen[parent.names | {name}] = parent, name
-    if len(known_in(best)) >= LARGEST_SET or search.part is not None:
-        gains = search.gains(best, is_thorough=not _is_large(best))
-        for name in sorted(gains, key=lambda name: -gains[name])[:FEW]:
-            if gains[name] > margin(best):
-                chosen[best.names | {name}] = best, name
+    gains = search.gains(best, is_thorough=not _is_large(best))
+    for name in sorted(gains, key=lambda name: -gains[name])[:FEW]:
+        if gains[name] > margin(best):
+            chosen[best.names | {name}] = best, name
     grown = search.workers.results([search.growth(parent, name) for parent, name in chosen.values()])
     polished = search.polished_near(grown, min((e.bic for e in grown), default=0.0))
     count = 2 if len(best.names) <= SMALL else 1

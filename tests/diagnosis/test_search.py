@@ -13,6 +13,7 @@ from host.diagnosis.fitter import Fitter
 from host.diagnosis.pruning import pruned
 from host.diagnosis.search import Search
 from host.diagnosis.together import completed
+from host.diagnosis.unknown_physics import with_unknown
 from host.diagnosis.workers import Workers
 from host.gauss_newton import Point
 from host.output_error import output_error
@@ -74,3 +75,13 @@ def test_two_members_are_missed_only_alone(monkeypatch: pytest.MonkeyPatch) -> N
             bic = 100.0 if names == whole else worth.get(names, 300.0)
             search.tried[names] = Explanation(names, fitter.base.fit, bic)
         assert pruned(search, search.tried[whole]).names == needed
+
+
+def test_an_effect_that_the_search_passed_over_competes_with_unknown_physics() -> None:
+    names = frozenset({"heave_pitch_rate_coupling", "actuator_lag"})
+    fitter = Fitter([flown({"c_wq": 0.8, "lag_time": 0.4}, names)])
+    half = fitted(fitter, frozenset({"actuator_lag"}), {"lag_time": 0.4})
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.trimmed())
+        search.remember(half)
+        assert with_unknown(search, half).names == names

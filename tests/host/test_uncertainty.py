@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from exact_dive import TABLE_1, Dive, fly
@@ -55,6 +57,24 @@ def test_coloured_sensor_noise_widens_the_deviations() -> None:
     error = np.abs(fit.parameters[:6] - np.array(list(TABLE_1.values())))
     assert (error < 4.0 * std[:6]).all()
     assert std[0] > 1.5 * np.sqrt(naive[0, 0])
+
+
+def test_no_variance_is_negative_where_two_parameters_cannot_be_told_apart() -> None:
+    recording, states = fly(Dive(duration=120.0, depth_noise=0.0))
+    rng = np.random.default_rng(4)
+    recording.depth[:] = states[3] + np.cumsum(rng.standard_normal(recording.time.size)) * 0.003
+    fit = fit_maximum_likelihood([recording], noise_model="output_error")
+    a, b = np.flatnonzero(fit.free)[:2]
+    for parallel in np.geomspace(1e-9, 1e-6, 12):
+        scores = [np.array(S) for S in fit.scores]
+        for S in scores:
+            S[:, 1] = S[:, 0] + parallel * S[:, 1]
+        M = sum(np.einsum("opk,oqk->pq", S, S) for S in scores)
+        information = np.array(fit.information)
+        information[np.ix_(fit.free, fit.free)] = M
+        variances = np.diag(covariance(replace(fit, scores=scores, information=information, rivals=())))
+        assert (variances >= 0.0).all()
+        assert variances[[a, b]].min() > 0.0
 
 
 def test_crosscovariance_equals_its_definition() -> None:
