@@ -111,6 +111,7 @@ class Effect:
               default the first; () where none is
     lags      whether it looks at earlier commands
     is_common whether every vehicle has it: always tried, and preferred where the recording cannot decide
+    beside    the effect without which it seldom acts
     """
 
     name: str
@@ -133,6 +134,7 @@ class Effect:
     sizes: tuple[str, ...] | None = None
     lags: bool = False
     is_common: bool = False
+    beside: str | None = None
 
     @property
     def size_names(self) -> tuple[str, ...]:

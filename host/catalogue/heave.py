@@ -59,6 +59,7 @@ EFFECTS = (
         manoeuvre="quick plane reversals, then climbs and dives held until the pitch has settled",
         probes=((0.05,), (-0.05,)),
         force=_acceleration,
+        beside="heave_pitch_rate_coupling",
     ),
     Effect(
         name="heave_quadratic_drag",

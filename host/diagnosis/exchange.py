@@ -54,7 +54,9 @@ def exchanged(search: "Search", best: Explanation) -> Explanation:
     close = [e for e in close if e.bic < best.bic + margin(best)]
     leaner = (pruned(search, e) if 1 < len(e.names) <= SMALL else e for e in close)
     rival = min(leaner, key=lambda e: e.bic, default=best)
-    return rival if rival.bic < best.bic - 0.01 else best
+    if rival.bic > best.bic - 0.01:
+        return best
+    return rival if is_small else pruned(search, rival)
 
 
 def _moves_depth(rival: Explanation, best: Explanation) -> bool:

@@ -37,6 +37,7 @@ from host.wave_forces import wave_forces, wave_forces_from
 
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
 RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exact twins
+LONELY = 8.0  # of BIC, against what seldom acts without another effect that is not there: odds of 50 to 1
 COMPRESSED = "depth_dependent_buoyancy"
 # Enough to rank sets; those that count are polished.
 FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 12, 0.2
@@ -267,13 +268,15 @@ class Fitter:
     def bic(self, fit: Fit, names: Names) -> float:
         """Bayesian information criterion of a fit; lower is better.
 
-        Charged as well: a speed that is hardly likely, what not every vehicle has, and the choice among all
-        the periods that an oscillation could have had.
+        Charged as well: a speed that is hardly likely, what not every vehicle has, or not by itself, and the
+        choice among all the periods that an oscillation could have had.
         """
         rare = sum(not named(name).is_common for name in names)
         unlikely = -2.0 * log_prior(fit)
         chosen = sum(2.0 * log(self._periods_within(named(name).periods)) for name in names)
-        return fit.bic + self.free_parameters(names) * log(fit.samples) + RARITY * rare + unlikely + chosen
+        lonely = sum(not {named(name).beside} <= names | {None} for name in names)
+        charged = RARITY * rare + LONELY * lonely + unlikely + chosen
+        return fit.bic + self.free_parameters(names) * log(fit.samples) + charged
 
     def _periods_within(self, limits: tuple[float, float] | None) -> float:
         """How many oscillations within these limits, s, the longest recording tells apart; at least 1."""

@@ -9,7 +9,7 @@ from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import structure_of
 from host.diagnosis.explanation import Explanation, Names
-from host.diagnosis.fitter import Fitter
+from host.diagnosis.fitter import LONELY, RARITY, Fitter
 from host.diagnosis.pruning import pruned
 from host.diagnosis.search import Search
 from host.diagnosis.together import completed
@@ -85,3 +85,12 @@ def test_an_effect_that_the_search_passed_over_competes_with_unknown_physics() -
         search = Search(fitter, workers, lambda _: None, fitter.base, fitter.trimmed())
         search.remember(half)
         assert with_unknown(search, half).names == names
+
+
+def test_what_seldom_acts_alone_is_charged_for_it() -> None:
+    fitter = Fitter([hidden_dive(duration=40.0)])
+    fit, coupling = fitter.base.fit, "heave_pitch_rate_coupling"
+    alone = frozenset({"heave_pitch_acceleration_coupling"})
+    assert fitter.bic(fit, alone) - fitter.bic(fit, frozenset({coupling})) == pytest.approx(LONELY + RARITY)
+    more = fitter.bic(fit, alone | {coupling}) - fitter.bic(fit, frozenset({coupling}))
+    assert more == pytest.approx(np.log(fit.samples) + RARITY)
