@@ -5,6 +5,7 @@ and a search that carries sets side by side costs most where sets are large. So 
 all that every vehicle has joins it, then what else promises most, and what does not pay is dropped at last.
 """
 
+from math import isfinite
 from typing import TYPE_CHECKING
 
 from host.catalogue import ORDINARY
@@ -32,7 +33,8 @@ def together(search: "Search", leading: Explanation) -> Explanation | None:
         if count == MOST_BESIDE:
             break
         found = search.workers.results(_more(search, best))
-        better = min(search.polished_near(found, min(e.bic for e in found)), key=lambda e: e.bic)
+        near = search.polished_near(found, min(e.bic for e in found))
+        better = min(near, key=lambda e: e.bic, default=best)  # none is near where all run away
         if better.bic > best.bic - margin(better):
             break
         best = better
@@ -57,7 +59,9 @@ def with_ordinary(search: "Search", explanation: Explanation) -> Explanation:
     """The set with all that every vehicle has, whatever the plane did before the recording."""
     for name in (*ORDINARY, PLANE_BEFORE.name):
         if name not in explanation.names:
-            explanation = search.fitter.grown(explanation, name, search.values(name))
+            grown = search.fitter.grown(explanation, name, search.values(name))
+            if isfinite(grown.bic):
+                explanation = grown
     search.joint.add(explanation.names)
     return search.remember(search.fitter.polished(explanation))
 

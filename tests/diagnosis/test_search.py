@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from hidden_dive import BASE, hidden_dive
 
-from host.catalogue import structure_of
+from host.catalogue import CATALOGUE, ORDINARY, structure_of
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import LONELY, RARITY, Fitter
 from host.diagnosis.pruning import pruned
 from host.diagnosis.search import Search
-from host.diagnosis.together import completed
+from host.diagnosis.together import completed, together, with_ordinary
 from host.diagnosis.unknown_physics import with_unknown
 from host.diagnosis.workers import Workers
 from host.gauss_newton import Point
@@ -94,3 +94,20 @@ def test_what_seldom_acts_alone_is_charged_for_it() -> None:
     assert fitter.bic(fit, alone) - fitter.bic(fit, frozenset({coupling})) == pytest.approx(LONELY + RARITY)
     more = fitter.bic(fit, alone | {coupling}) - fitter.bic(fit, frozenset({coupling}))
     assert more == pytest.approx(np.log(fit.samples) + RARITY)
+
+
+def test_what_runs_away_joins_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def grown(_: Fitter, parent: Explanation, name: str, *__: object) -> Explanation:
+        return Explanation(parent.names | {name}, parent.fit, np.inf if name in lost else parent.bic)
+
+    monkeypatch.setattr(Fitter, "grown", grown)
+    monkeypatch.setattr(Fitter, "polished", lambda _self, explanation: explanation)
+    monkeypatch.setattr(Fitter, "excess", lambda *_: 5.0)
+    monkeypatch.setattr(Search, "gains", lambda *_: {"munk_moment": 1.0})
+    fitter = Fitter([hidden_dive(duration=40.0)])
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.base)
+        lost = {"speed_loss"}
+        assert with_ordinary(search, fitter.base).names == {*ORDINARY, "plane_before"} - lost
+        lost = {effect.name for effect in CATALOGUE}
+        assert together(search, fitter.base) is None
