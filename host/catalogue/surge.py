@@ -13,7 +13,7 @@ def _speed_loss(c: Chain) -> None:
     c.rates["speed_loss"] = (
         -change * (1 + c.speed_ratio) / 2 / c.p["speed_time"]
         - c.p["c_ud"] * (c.speed_ratio * c.plane) ** 2
-        # Both forces belong to the heave mass, which the surge mass is moved by.
+        # Both are known per heave mass; c_uq makes them accelerations of the surge mass.
         - c.p["c_uq"] * (c.w * c.q + net_weight(c) * ca.sin(c.theta))
     )
     c.surge = c.surge + c.rates["speed_loss"] * (1 - is_known)

@@ -47,8 +47,9 @@ def completed(search: "Search", best: Explanation) -> Explanation:
 
     One at a time they may promise nothing, where the set is bent to do without them.
     """
-    is_left_of_one = any(len(best.names - names - {*OFFSETS}) <= 1 for names in search.joint)
-    if len(best.names) <= SMALL or is_left_of_one or search.root.fit.has_process_noise:
+    # One that joined later was fitted beside all that was left then.
+    was_joint = any(len(best.names - names - {*OFFSETS}) <= 1 for names in search.joint)
+    if len(best.names) <= SMALL or was_joint or search.root.fit.has_process_noise:
         return best
     search.on_progress("what every vehicle has beside it")
     (joint,) = search.across([with_ordinary(search, best)])

@@ -196,9 +196,10 @@ def test_a_servo_lag_is_exact_behind_a_delay_however_coarse_the_rows(lag: float,
     assert (np.abs(off).max(axis=1) < 2e-3 * rate).all()
 
 
-def test_a_rate_limit_is_exact_however_coarse_the_rows() -> None:
-    rows, structure = hidden_dive(duration=30.0), structure_of(("actuator_rate_limit",))
-    values = np.array([*BASE.values(), 0.0, 0.0, 1.1])
+@pytest.mark.parametrize("names", [("actuator_rate_limit",), ("actuator_rate_limit", "actuator_lag")])
+def test_a_rate_limit_is_exact_however_coarse_the_rows(names: tuple[str, ...]) -> None:
+    rows, structure = hidden_dive(duration=30.0), structure_of(names)
+    values = np.array([*BASE.values(), 0.0, 0.0, 1.1, 0.08])[: len(structure.names)]
     run = free_run(values, START, inputs_of(rows, structure, 0.1)).outputs
     true = free_run(values, START, inputs_of(finer(rows), structure)).outputs[:, ::EACH]
     assert np.abs(run - true).max() < 1e-3 * np.ptp(true, axis=1).min()

@@ -66,6 +66,12 @@ def test_bars_and_intervals_of_rates() -> None:
     assert bar(Rate(name="", hits=0, count=1, most=0.02)) == "<= 2 %"
 
 
+def test_slots_are_not_judged_beside_what_every_vehicle_has() -> None:
+    laden = judge(answer(usual=["actuator_lag"]), recorded(), diagnosis(effect("trim_moment")))
+    assert rates(score([laden]))["slot located right"] == (0, 0)
+    assert rates(score([*five(), laden]))["slot located right"] == (2, 4)
+
+
 def test_tables_page_and_file_say_the_same(tmp_path: Path) -> None:
     judged = five()
     result = score(judged)

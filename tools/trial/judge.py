@@ -44,6 +44,7 @@ class Judged:
     are_named     all that is hidden was named
     are_in_class  all that is hidden was named or stands in the class of one that was
     is_exact      all that is hidden was named and nothing else
+    is_slot_right the largest share lies in a slot of what is hidden; None beside what every vehicle has
     admits        the verdict says that something stays unexplained
     over_floor    held-out free-run error over the noise that no model can foresee; `base_over_floor` before
     over_truth    the same over what the true structure reaches in the same spans

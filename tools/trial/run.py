@@ -90,14 +90,8 @@ def _fit_true(folder: Path, recording: Path, answer: Answer) -> None:
         start = dict(answer.base)
         for coefficients in answer.coefficients.values():
             start |= coefficients
-        told = [
-            "--effects",
-            ",".join([*answer.usual, *answer.hidden]),
-            "--start",
-            json.dumps(start),
-            "--out",
-            str(out),
-        ]
+        acting = ",".join([*answer.usual, *answer.hidden])
+        told = ["--effects", acting, "--start", json.dumps(start), "--out", str(out)]
         command = [sys.executable, "-m", "tools.true_structure", str(recording), *told]
         subprocess.run(command, env=_environment(), capture_output=True, timeout=MOST_SECONDS, check=False)
 

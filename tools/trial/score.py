@@ -65,13 +65,12 @@ class Score:
 
 def score(judged: list[Judged]) -> Score:
     """Sums up the judged recordings; those without a diagnosis count as wrong."""
-    none, one, two, outside = (
-        [j for j in judged if j.case == case] for case in ("none", "one", "two", "outside")
-    )
+    none, one, two, outside = (_of(case, judged) for case in ("none", "one", "two", "outside"))
     effect = [c for j in judged for c in j.effect_coefficients]
     base = [c for j in judged for c in j.base_coefficients]
     exact = [j for j in judged if j.is_exact and j.over_floor is not None]
     told = [j for j in judged if j.over_truth is not None]
+    located = [j for j in judged if j.is_slot_right is not None]
     known = [j for j in judged if j.case != "outside" and j.over_floor is not None]
     rates = [
         _rate("one hidden: named first", one, lambda j: bool(j.is_first), least=0.92),
@@ -85,8 +84,15 @@ def score(judged: list[Judged]) -> Score:
         _rate("nothing hidden: something named", none, lambda j: bool(j.named) or j.has_failed, most=0.02),
         _rate("nothing hidden: verdict no_mismatch", none, lambda j: j.verdict == "no_mismatch"),
         _rate("outside physics: unexplained or partly explained", outside, lambda j: j.admits, 0.90),
-        _rate("outside physics: slot located right", outside, lambda j: bool(j.is_slot_right)),
-        _rate("slot located right", [*one, *two], lambda j: bool(j.is_slot_right), 0.97),
+        _rate(
+            "outside physics: slot located right", _of("outside", located), lambda j: bool(j.is_slot_right)
+        ),
+        _rate(
+            "slot located right",
+            _of("one", located) + _of("two", located),
+            lambda j: bool(j.is_slot_right),
+            0.97,
+        ),
         _rate("abstention: something hidden, nothing named", [*one, *two], lambda j: not j.named),
         _rate("held-out error <= 1.05 x true structure", told, lambda j: _within(j.over_truth, 1.05), 0.90),
         _rate("held-out error <= 1.05 x noise", known, lambda j: _within(j.over_floor, 1.05)),
@@ -126,6 +132,10 @@ def score(judged: list[Judged]) -> Score:
         longest_seconds=max((j.seconds for j in judged), default=0.0),
         largest_memory_mb=max((j.memory_mb for j in judged), default=0.0),
     )
+
+
+def _of(case: str, judged: list[Judged]) -> list[Judged]:
+    return [one for one in judged if one.case == case]
 
 
 def _rate(
