@@ -15,8 +15,9 @@ from scipy.linalg import solve_banded
 from host.ascent import ascend
 from host.fit import Fit, finished, run_away
 from host.gauss_newton import Point
-from host.propagate import Inputs, free_run, innovations
+from host.propagate import Inputs, free_run
 from host.recording import Array
+from host.sensitivities import innovations
 
 LONGEST_TIME = 60.0  # s; slower wandering is current or leak, not a sensor
 FIRST_TIME = 1.0  # s, where the search begins

@@ -9,8 +9,9 @@ from host.ascent import ascend
 from host.fit import Fit, finished, run_away
 from host.gauss_newton import Mask, Point, whiten
 from host.kalman import KalmanPass, kalman_pass
-from host.propagate import Inputs, innovations
+from host.propagate import Inputs
 from host.recording import Array
+from host.sensitivities import innovations
 
 
 class RandomForces:

@@ -16,8 +16,9 @@ from host.interval_likelihood import (
     log_probability,
     score_and_information,
 )
-from host.propagate import Inputs, free_run, innovations
+from host.propagate import Inputs, free_run
 from host.recording import Array
+from host.sensitivities import innovations
 
 # rad^2, m^2: below any sensor, so that noise-free data divide by no zero
 SMALLEST_NOISE = np.array([1e-12, 1e-10])

@@ -7,8 +7,9 @@ import numpy as np
 from host.errors import RecordingError
 from host.model import VehicleModel
 from host.outliers import without_outliers
-from host.propagate import Inputs, free_run, innovations, inputs_of
+from host.propagate import Inputs, free_run, inputs_of
 from host.recording import Array, Recording
+from host.sensitivities import innovations
 
 SETTLING_SPAN = 5.0  # s from the start, from which alone the initial state is estimated
 

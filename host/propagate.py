@@ -1,8 +1,8 @@
-"""Propagation of the equations over a recording: free run and exact sensitivities.
+"""Propagation of the equations over a recording.
 
 Between rows the command is held (zero-order hold), as the actuator holds it, and the state advances by
 classical fourth-order Runge-Kutta in sub-steps short enough that its error stays below the sensors'
-resolution; derivatives are those of the very same steps, by CasADi, so gradients are exact.
+resolution.
 """
 
 from collections.abc import Callable
@@ -178,46 +178,6 @@ def _free_run(form: Form) -> ca.Function:
     )
 
 
-@cache
-def _free_sensitivities(form: Form) -> ca.Function:
-    """One step of the free run with d/d(parameters, initial state) carried along."""
-    x, p, drive = form.symbols()
-    S = ca.SX.sym("S", form.nx, form.np + NX0)
-    y, seen = _seen(form, x, S, p, drive)
-    carried, carried_next = ca.vertcat(x, ca.vec(S)), _carried_on(form, x, S, p, drive)
-    return ca.Function("free_sensitivities", [carried, drive, p], [carried_next, ca.vertcat(y, ca.vec(seen))])
-
-
-@cache
-def _sensitivities(form: Form) -> ca.Function:
-    """The same for the innovations form x+ = F(x + K e), at fixed gain."""
-    x, p, drive = form.symbols()
-    measured, gain = ca.SX.sym("measured", 2), ca.SX.sym("gain", form.nx * 2)
-    S = ca.SX.sym("S", form.nx, form.np + NX0)
-    K = ca.reshape(gain, form.nx, 2)
-    y, seen = _seen(form, x, S, p, drive)
-    carried = ca.vertcat(x, ca.vec(S))
-    carried_next = _carried_on(form, x + K @ (measured - y), S - K @ seen, p, drive)
-    per_step = ca.vertcat(drive, measured, gain)
-    return ca.Function("sensitivities", [carried, per_step, p], [carried_next, ca.vertcat(y, ca.vec(seen))])
-
-
-def _seen(form: Form, x: ca.SX, S: ca.SX, p: ca.SX, drive: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """The outputs and their sensitivities."""
-    y = form.outputs(x, p, drive)
-    return y, ca.jacobian(y, x) @ S + ca.horzcat(ca.jacobian(y, p), ca.SX(2, NX0))
-
-
-def _carried_on(form: Form, x: ca.SX, S: ca.SX, p: ca.SX, drive: ca.SX) -> ca.SX:
-    """State and sensitivities one row later."""
-    before = ca.SX.sym("before", form.nx)
-    after = form.step(before, p, drive)
-    A = ca.Function("A", [before, p, drive], [after, ca.jacobian(after, before), ca.jacobian(after, p)])
-    x_next, Ax, Ap = A(x, p, drive)
-    S_next = Ax @ S + ca.horzcat(Ap, ca.SX(form.nx, NX0))
-    return ca.vertcat(x_next, ca.vec(S_next))
-
-
 OverRows = Callable[[Array, Array, Array], Array]
 
 
@@ -287,25 +247,3 @@ def free_run(parameters: Array, initial: Array, inputs: Inputs) -> FreeRun:
     start, _ = start_of(form, parameters, initial, inputs)
     table = over_rows(_free_run, form, inputs.drive.shape[1])(start, inputs.drive, parameters)
     return FreeRun(states=table[: form.nx], outputs=table[form.nx :])
-
-
-def innovations(
-    parameters: Array, initial: Array, inputs: Inputs, gains: Array | None = None
-) -> tuple[Array, Array]:
-    """Innovations e = y - yhat (2, N) and the predictions' sensitivities (2, parameters + 4, N), exact.
-
-    gains  (2 nx, N) Kalman gain of each row, column-major nx x 2; None for output error (free run).
-           The derivative is taken at fixed gain.
-    """
-    form, rows = form_of(inputs), inputs.drive.shape[1]
-    start, slopes = start_of(form, parameters, initial, inputs)
-    carried = np.concatenate([start, slopes.ravel(order="F")])
-    if gains is None:
-        table = over_rows(_free_sensitivities, form, rows)(carried, inputs.drive, parameters)
-    else:
-        per_step = np.vstack([inputs.drive, inputs.measured, gains])
-        table = over_rows(_sensitivities, form, rows)(carried, per_step, parameters)
-    with np.errstate(over="ignore", invalid="ignore"):  # a run that leaves the numbers is seen by its size
-        error = inputs.present * (inputs.measured - table[:2])
-        sensitivity = table[2:].reshape((2, form.np + NX0, rows), order="F") * inputs.present[:, None, :]
-    return error, sensitivity

@@ -7,8 +7,9 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import BY_NAME, CATALOGUE, UNKNOWN, structure_of
-from host.propagate import free_run, innovations, inputs_of
+from host.propagate import free_run, inputs_of
 from host.recording import Recording
+from host.sensitivities import innovations
 
 NAMES_OF_THE_FORMAT = {
     "heave_pitch_rate_coupling", "heave_quadratic_drag", "net_buoyancy", "depth_dependent_buoyancy",

@@ -3,7 +3,8 @@ from exact_dive import TABLE_1, Dive, fly
 from scipy.stats import multivariate_normal
 
 from host.kalman import kalman_pass
-from host.propagate import free_run, innovations, inputs_of
+from host.propagate import free_run, inputs_of
+from host.sensitivities import innovations
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 

@@ -1,0 +1,87 @@
+"""Exact sensitivities of what the sensors would give, to the parameters and to the initial state.
+
+A run x' = F(x + K e), e = y - h(x), has S = dx / d(parameters, initial state) with
+
+    dh = h_x S + h_p,    S' = F_x (S - K dh) + F_p
+
+at fixed gain K; without one it is the free run. The slopes F_x, F_p, h_x, h_p are those of the very
+Runge-Kutta steps of the run; where the run has been, they are evaluated at all rows at once.
+"""
+
+from functools import cache
+
+import casadi as ca
+import numpy as np
+
+from host.all_rows import AllRows
+from host.propagate import Form, Inputs, form_of, free_run, over_rows, start_of
+from host.recording import Array
+
+
+def innovations(
+    parameters: Array, initial: Array, inputs: Inputs, gains: Array | None = None
+) -> tuple[Array, Array]:
+    """Innovations e = y - yhat (2, N) and the predictions' sensitivities (2, parameters + 4, N), exact.
+
+    gains  (2 nx, N) Kalman gain of each row, column-major nx x 2; None for output error (free run).
+           The derivative is taken at fixed gain.
+    """
+    form, rows = form_of(inputs), inputs.drive.shape[1]
+    start, slopes = start_of(form, parameters, initial, inputs)
+    if gains is None:
+        run = free_run(parameters, initial, inputs)
+        states, outputs, corrected = run.states, run.outputs, run.states
+    else:
+        per_step = np.vstack([inputs.drive, inputs.measured, gains])
+        table = over_rows(_steered_run, form, rows)(start, per_step, parameters)
+        states, outputs, corrected = np.split(table, [form.nx, form.nx + 2])
+    with np.errstate(all="ignore"):  # a run that leaves the numbers is seen by its size
+        Fx, Fp = _step_slopes(form)(corrected, parameters, inputs.drive)
+        hx, hp = _output_slopes(form)(states, parameters, inputs.drive)
+        if gains is not None:
+            K = gains.T.reshape((rows, 2, form.nx)).transpose(0, 2, 1)
+            FK = Fx @ K
+            Fx, Fp = Fx - FK @ hx, Fp - FK @ hp
+        S = _recursion(Fx, Fp, slopes)
+        seen = hx @ S
+        seen[:, :, : form.np] += hp
+        error = inputs.present * (inputs.measured - outputs)
+        sensitivity = seen.transpose(1, 2, 0) * inputs.present[:, None, :]
+    return error, sensitivity
+
+
+def _recursion(Fx: Array, Fp: Array, start: Array) -> Array:
+    """S (N, nx, parameters + 4) with S' = F_x S + F_p from its value at the first row."""
+    S = np.zeros((Fx.shape[0], *start.shape))
+    S[0], S[1:, :, : Fp.shape[2]] = start, Fp[:-1]
+    for slope, now, following in zip(Fx, S, S[1:], strict=False):
+        following += slope.dot(now)
+    return S
+
+
+@cache
+def _steered_run(form: Form) -> ca.Function:
+    """One step of the run that follows the measurements with a given gain; gives x, h(x) and x + K e."""
+    x, p, drive = form.symbols()
+    measured, gain = ca.SX.sym("measured", 2), ca.SX.sym("gain", form.nx * 2)
+    y = form.outputs(x, p, drive)
+    corrected = x + ca.reshape(gain, form.nx, 2) @ (measured - y)
+    per_step = ca.vertcat(drive, measured, gain)
+    result = ca.vertcat(x, y, corrected)
+    return ca.Function("steered_run", [x, per_step, p], [form.step(corrected, p, drive), result])
+
+
+@cache
+def _step_slopes(form: Form) -> AllRows:
+    """F_x (nx, nx) and F_p (nx, parameters) of one step."""
+    x, p, drive = form.symbols()
+    after = form.step(x, p, drive)
+    return AllRows(ca.Function("step", [x, p, drive], ca.cse([ca.jacobian(after, x), ca.jacobian(after, p)])))
+
+
+@cache
+def _output_slopes(form: Form) -> AllRows:
+    """h_x (2, nx) and h_p (2, parameters)."""
+    x, p, drive = form.symbols()
+    y = form.outputs(x, p, drive)
+    return AllRows(ca.Function("output", [x, p, drive], [ca.jacobian(y, x), ca.jacobian(y, p)]))

@@ -1,0 +1,36 @@
+import casadi as ca
+import numpy as np
+import pytest
+
+from host.all_rows import MOST_ROWS, AllRows
+
+
+def test_every_operation_equals_casadi_s() -> None:
+    x, p = ca.SX.sym("x", 2), ca.SX.sym("p", 2)
+    a, b, c, d = x[0], x[1], p[0], p[1]
+    results = [a + b, a - b, a * c, b / a, -a, a**2, ca.sqrt(ca.fabs(b)), 2 * b, 1 / a, ca.exp(b)]
+    results += [ca.log(ca.fabs(a)), ca.fabs(a) ** c, ca.fabs(a) ** 2.5, ca.sin(a), ca.cos(b), ca.tan(b)]
+    results += [ca.tanh(a), ca.sign(b), ca.fmin(a, b), ca.fmax(a, c), a < b, a <= b, ca.eq(a, a), ca.ne(a, b)]
+    results += [ca.logic_not(a < b), ca.logic_and(a < b, b < c), ca.logic_or(a < b, b < c), c * d]
+    results += [ca.if_else(a < b, a, c), ca.SX(3.0)]
+    function = ca.Function("all", [x, p], [ca.vertcat(*results)])
+    rows, parameters = np.random.default_rng(1).normal(size=(2, 50)), np.array([0.7, -1.3])
+    expected = np.array(function.map(50)(rows, np.tile(parameters[:, None], (1, 50))))
+    (found,) = AllRows(function)(rows, parameters)
+    np.testing.assert_allclose(found[:, :, 0].T, expected, rtol=1e-15)
+
+
+def test_matrices_keep_their_shape_and_rows_beyond_one_batch_are_there() -> None:
+    x = ca.SX.sym("x")
+    matrix = ca.SX(2, 3)
+    matrix[1, 2] = x
+    (found,) = AllRows(ca.Function("sparse", [x], [matrix]))(np.arange(MOST_ROWS + 10.0)[None])
+    assert found.shape == (MOST_ROWS + 10, 2, 3)
+    np.testing.assert_array_equal(found[:, 1, 2], np.arange(MOST_ROWS + 10.0))
+    assert np.count_nonzero(found) == MOST_ROWS + 9
+
+
+def test_an_unknown_operation_is_refused() -> None:
+    x = ca.SX.sym("x")
+    with pytest.raises(NotImplementedError, match="operations"):
+        AllRows(ca.Function("erf", [x], [ca.erf(x)]))
