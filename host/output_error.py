@@ -16,9 +16,9 @@ from host.interval_likelihood import (
     log_probability,
     score_and_information,
 )
-from host.propagate import Inputs, free_run
+from host.propagate import Inputs, Run, free_run
 from host.recording import Array
-from host.sensitivities import innovations
+from host.sensitivities import sensitivities
 
 # rad^2, m^2: below any sensor, so that noise-free data divide by no zero
 SMALLEST_NOISE = np.array([1e-12, 1e-10])
@@ -32,8 +32,9 @@ def output_error(
 ) -> Fit:
     """Gauss-Newton on the free run, the noise variances concentrated out; ends at a gain below tolerance."""
     point, damping, converged, iterations = start, 1e-3, False, 0
-    parts = _innovations(point, inputs)
-    noise, cost = _likeliest_noise([error for error, _ in parts], inputs)
+    runs = _free_runs(point, inputs)
+    noise, cost = _likeliest_noise(_errors(runs, inputs), inputs)
+    parts = _innovations(point, runs, inputs)
     if not np.isfinite(cost) or not all(np.abs(S).max() < RUNAWAY for _, S in parts):
         return run_away(point, inputs, free)
     while not converged and iterations < most_iterations:
@@ -41,7 +42,8 @@ def output_error(
         step = GaussNewton(_whitened_by(noise, parts, inputs), point, free)
         while True:
             trial = step.trial(damping)
-            trial_noise, trial_cost = _likeliest_noise(_free_run_errors(trial, inputs), inputs)
+            runs = _free_runs(trial, inputs)
+            trial_noise, trial_cost = _likeliest_noise(_errors(runs, inputs), inputs)
             if trial_cost < cost or damping > 1e8:
                 break
             damping = max(damping * 8.0, 1e-6)
@@ -50,7 +52,7 @@ def output_error(
             break
         converged = cost - trial_cost < tolerance
         cost, point, noise = trial_cost, trial, trial_noise
-        parts = _innovations(point, inputs)
+        parts = _innovations(point, runs, inputs)
         damping = damping / 10.0
     point = point.with_noise(np.concatenate([noise, [0.0, 0.0]]))
     white = _whitened_by(noise, parts, inputs)
@@ -81,19 +83,29 @@ def annealed(start: Point, inputs: list[Inputs], free: Mask, accelerations: tupl
 
 def free_run_cost(point: Point, inputs: list[Inputs]) -> float:
     """-log L of the free run at a point, but for a constant; inf where it runs away."""
-    _, cost = _likeliest_noise(_free_run_errors(point, inputs), inputs)
+    _, cost = _likeliest_noise(_errors(_free_runs(point, inputs), inputs), inputs)
     return cost if np.isfinite(cost) else np.inf
 
 
 def residuals_at(point: Point, inputs: list[Inputs]) -> tuple[list[tuple[Array, Array]], float]:
     """Free-run residuals whitened by the point's sensor noise, their sensitivities, and the deviance."""
-    parts = _innovations(point, inputs)
+    parts = _innovations(point, _free_runs(point, inputs), inputs)
     white = _whitened_by(point.noise, parts, inputs)
     return white, _deviance(point.noise, parts, white, inputs)
 
 
-def _innovations(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:
-    return [innovations(point.parameters, x0, one) for x0, one in zip(point.initial, inputs, strict=True)]
+def _free_runs(point: Point, inputs: list[Inputs]) -> list[Run]:
+    return [free_run(point.parameters, x0, one) for x0, one in zip(point.initial, inputs, strict=True)]
+
+
+def _errors(runs: list[Run], inputs: list[Inputs]) -> list[Array]:
+    with np.errstate(invalid="ignore"):  # a trial that runs away is infinite, and refused for it
+        return [one.present * (one.measured - run.outputs) for run, one in zip(runs, inputs, strict=True)]
+
+
+def _innovations(point: Point, runs: list[Run], inputs: list[Inputs]) -> list[tuple[Array, Array]]:
+    each = zip(_errors(runs, inputs), runs, point.initial, inputs, strict=True)
+    return [(error, sensitivities(point.parameters, x0, one, run)) for error, run, x0, one in each]
 
 
 def _whitened_by(
@@ -130,14 +142,6 @@ def _deviance(
 def _before_rounding(variance: float, step: float) -> float:
     """Deviation of the noise that was rounded."""
     return float(np.sqrt(max(variance - step**2 / 12.0, (LEAST_DEVIATION * step) ** 2)))
-
-
-def _free_run_errors(point: Point, inputs: list[Inputs]) -> list[Array]:
-    with np.errstate(invalid="ignore"):  # a trial that runs away is infinite, and refused for it
-        return [
-            one.present * (one.measured - free_run(point.parameters, x0, one).outputs)
-            for x0, one in zip(point.initial, inputs, strict=True)
-        ]
 
 
 def _likeliest_noise(errors: list[Array], inputs: list[Inputs]) -> tuple[Array, float]:

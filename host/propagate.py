@@ -234,16 +234,16 @@ def start_of(form: Form, parameters: Array, initial: Array, inputs: Inputs) -> t
 
 
 @dataclass(frozen=True, slots=True)
-class FreeRun:
-    """States (nx, N) and outputs pitch, depth (2, N) of a run that never looks at the measurements."""
+class Run:
+    """States (nx, N) and outputs pitch, depth (2, N)."""
 
     states: Array
     outputs: Array
 
 
-def free_run(parameters: Array, initial: Array, inputs: Inputs) -> FreeRun:
-    """Simulates from the base states [w, q, theta, zeta] (4,) at the first row."""
+def free_run(parameters: Array, initial: Array, inputs: Inputs) -> Run:
+    """Simulates from the base states [w, q, theta, zeta] (4,) at the first row, blind to the measurements."""
     form = form_of(inputs)
     start, _ = start_of(form, parameters, initial, inputs)
     table = over_rows(_free_run, form, inputs.drive.shape[1])(start, inputs.drive, parameters)
-    return FreeRun(states=table[: form.nx], outputs=table[form.nx :])
+    return Run(states=table[: form.nx], outputs=table[form.nx :])

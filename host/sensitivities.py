@@ -14,40 +14,55 @@ import casadi as ca
 import numpy as np
 
 from host.all_rows import AllRows
-from host.propagate import Form, Inputs, form_of, free_run, over_rows, start_of
+from host.propagate import Form, Inputs, Run, form_of, free_run, over_rows, start_of
 from host.recording import Array
 
 
 def innovations(
     parameters: Array, initial: Array, inputs: Inputs, gains: Array | None = None
 ) -> tuple[Array, Array]:
-    """Innovations e = y - yhat (2, N) and the predictions' sensitivities (2, parameters + 4, N), exact.
+    """Innovations e = y - yhat (2, N) and the predictions' sensitivities (2, parameters + 4, N).
 
     gains  (2 nx, N) Kalman gain of each row, column-major nx x 2; None for output error (free run).
            The derivative is taken at fixed gain.
     """
-    form, rows = form_of(inputs), inputs.drive.shape[1]
-    start, slopes = start_of(form, parameters, initial, inputs)
     if gains is None:
         run = free_run(parameters, initial, inputs)
-        states, outputs, corrected = run.states, run.outputs, run.states
     else:
-        per_step = np.vstack([inputs.drive, inputs.measured, gains])
-        table = over_rows(_steered_run, form, rows)(start, per_step, parameters)
-        states, outputs, corrected = np.split(table, [form.nx, form.nx + 2])
+        run = _steered(parameters, initial, inputs, gains)
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = inputs.present * (inputs.measured - run.outputs)
+    return error, sensitivities(parameters, initial, inputs, run, gains)
+
+
+def sensitivities(
+    parameters: Array, initial: Array, inputs: Inputs, run: Run, gains: Array | None = None
+) -> Array:
+    """Sensitivities (2, parameters + 4, N) of a run's outputs, 0 where nothing was measured."""
+    form, rows = form_of(inputs), inputs.drive.shape[1]
+    _, start = start_of(form, parameters, initial, inputs)
     with np.errstate(all="ignore"):  # a run that leaves the numbers is seen by its size
-        Fx, Fp = _step_slopes(form)(corrected, parameters, inputs.drive)
-        hx, hp = _output_slopes(form)(states, parameters, inputs.drive)
-        if gains is not None:
+        hx, hp = _output_slopes(form)(run.states, parameters, inputs.drive)
+        if gains is None:
+            Fx, Fp = _step_slopes(form)(run.states, parameters, inputs.drive)
+        else:
             K = gains.T.reshape((rows, 2, form.nx)).transpose(0, 2, 1)
+            corrected = run.states + (K @ (inputs.measured - run.outputs).T[:, :, None])[:, :, 0].T
+            Fx, Fp = _step_slopes(form)(corrected, parameters, inputs.drive)
             FK = Fx @ K
             Fx, Fp = Fx - FK @ hx, Fp - FK @ hp
-        S = _recursion(Fx, Fp, slopes)
-        seen = hx @ S
+        seen = hx @ _recursion(Fx, Fp, start)
         seen[:, :, : form.np] += hp
-        error = inputs.present * (inputs.measured - outputs)
-        sensitivity = seen.transpose(1, 2, 0) * inputs.present[:, None, :]
-    return error, sensitivity
+        return seen.transpose(1, 2, 0) * inputs.present[:, None, :]
+
+
+def _steered(parameters: Array, initial: Array, inputs: Inputs, gains: Array) -> Run:
+    """The run that follows the measurements with given gains."""
+    form = form_of(inputs)
+    start, _ = start_of(form, parameters, initial, inputs)
+    per_step = np.vstack([inputs.drive, inputs.measured, gains])
+    table = over_rows(_steered_run, form, inputs.drive.shape[1])(start, per_step, parameters)
+    return Run(states=table[: form.nx], outputs=table[form.nx :])
 
 
 def _recursion(Fx: Array, Fp: Array, start: Array) -> Array:
@@ -61,14 +76,13 @@ def _recursion(Fx: Array, Fp: Array, start: Array) -> Array:
 
 @cache
 def _steered_run(form: Form) -> ca.Function:
-    """One step of the run that follows the measurements with a given gain; gives x, h(x) and x + K e."""
+    """One step of the innovations form; gives x and h(x)."""
     x, p, drive = form.symbols()
     measured, gain = ca.SX.sym("measured", 2), ca.SX.sym("gain", form.nx * 2)
     y = form.outputs(x, p, drive)
     corrected = x + ca.reshape(gain, form.nx, 2) @ (measured - y)
     per_step = ca.vertcat(drive, measured, gain)
-    result = ca.vertcat(x, y, corrected)
-    return ca.Function("steered_run", [x, per_step, p], [form.step(corrected, p, drive), result])
+    return ca.Function("steered_run", [x, per_step, p], [form.step(corrected, p, drive), ca.vertcat(x, y)])
 
 
 @cache

@@ -9,7 +9,7 @@ import numpy as np
 from host.model import VehicleModel
 from host.outliers import without_outliers
 from host.predict import SETTLING_SPAN, estimate_initial_state
-from host.propagate import FreeRun, free_run, inputs_of
+from host.propagate import Run, free_run, inputs_of
 from host.recording import Array, Recording
 
 COLUMNS = ("time_s", "depth_m", "pitch_rad", "rudder_rad", "speed_mps", "pitch_rate_radps", "heave_mps")
@@ -20,7 +20,7 @@ class Simulation:
     """A free run at the rows of `time`, with the rudder and speed that drove it."""
 
     time: Array
-    run: FreeRun
+    run: Run
     rudder: Array
     speed: Array
 
