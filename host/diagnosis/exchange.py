@@ -4,7 +4,7 @@ from math import log
 from typing import TYPE_CHECKING
 
 from host.catalogue import BY_NAME, CATALOGUE, named
-from host.catalogue.kin import OFFSETS, PITCHING_INTO_DEPTH, is_time, measure_alike
+from host.catalogue.kin import OFFSETS, PITCHING_INTO_DEPTH, measure_alike
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.margins import FEW, LARGEST_SET, NAMING_MARGIN, SMALL, TWIN_MARGIN, margin
 from host.diagnosis.pruning import pruned
@@ -31,7 +31,7 @@ def exchanged(search: "Search", best: Explanation) -> Explanation:
         gains = search.gains(smaller, is_small, kin if is_large else None)
         rivals = _likely(gains, smaller.bic - best.bic, RIVALS if is_small else FEW)
         kin &= gains.keys()
-        rivals |= kin if is_small else {name for name in kin if is_time(named(name))}
+        rivals |= kin if is_small else {name for name in kin if measure_alike(named(name), named(member))}
         for name in sorted(rivals - best.names):
             beside = best if name in kin else None
             fits = ("grown", (smaller, name, search.values(name), beside))
