@@ -13,6 +13,12 @@ import numpy as np
 from host.recording import Array
 
 MOST_ROWS = 4096  # at once: the intermediate results of more would not stay in a cache
+ALONE = -1  # in place of the second operand of an operation that has one
+
+
+def _same(value: Array | float) -> Array | float:
+    return value
+
 
 _OPERATIONS: dict[int, Callable[..., Any]] = {
     ca.OP_ADD: np.add,
@@ -44,7 +50,7 @@ _OPERATIONS: dict[int, Callable[..., Any]] = {
     ca.OP_AND: lambda x, y: 1.0 * ((x != 0.0) & (y != 0.0)),
     ca.OP_OR: lambda x, y: 1.0 * ((x != 0.0) | (y != 0.0)),
     ca.OP_IF_ELSE_ZERO: lambda x, y: np.where(x, y, 0.0),
-    ca.OP_ASSIGN: lambda x: x,
+    ca.OP_ASSIGN: _same,
 }
 
 
@@ -55,23 +61,35 @@ class AllRows:
     """
 
     def __init__(self, function: ca.Function) -> None:
-        steps = range(function.n_instructions())
-        codes = [function.instruction_id(step) for step in steps]
-        if unknown := set(codes) - {*_OPERATIONS, ca.OP_CONST, ca.OP_INPUT, ca.OP_OUTPUT}:
-            raise NotImplementedError(f"CasADi operations {sorted(unknown)} over all rows")
-        self._program = [
-            (
-                code,
-                _OPERATIONS.get(code),
-                function.instruction_constant(step) if code == ca.OP_CONST else 0.0,
-                tuple(function.instruction_input(step)),
-                tuple(function.instruction_output(step)),
-            )
-            for step, code in zip(steps, codes, strict=True)
-        ]
-        results = [function.sparsity_out(k) for k in range(function.n_out())]
-        self._shapes = [result.shape for result in results]
-        self._places = [list(zip(*result.get_triplet(), strict=True)) for result in results]
+        self._work: list[Array | float] = [0.0] * function.sz_w()
+        self._program: list[tuple[Callable[..., Any], int, int, int]] = []
+        self._given: list[tuple[int, int, int]] = []  # argument, component, place
+        self._results: list[tuple[int, int, int, int]] = []  # result, row, column, place
+        shapes = [function.sparsity_out(k) for k in range(function.n_out())]
+        self._shapes = [sparsity.shape for sparsity in shapes]
+        entries = [list(zip(*sparsity.get_triplet(), strict=True)) for sparsity in shapes]
+        # CasADi uses a place again once it is free; what is given or constant gets one for good.
+        now_at = list(range(len(self._work)))
+        for step in range(function.n_instructions()):
+            code, taken = function.instruction_id(step), function.instruction_output(step)
+            given = function.instruction_input(step)
+            if code == ca.OP_OUTPUT:
+                result, entry = taken
+                self._results.append((result, *entries[result][entry], self._new_place()))
+                self._program.append((_same, now_at[given[0]], ALONE, self._results[-1][3]))
+                continue
+            if code in (ca.OP_INPUT, ca.OP_CONST):
+                now_at[taken[0]] = self._new_place()
+                if code == ca.OP_INPUT:
+                    self._given.append((given[0], given[1], now_at[taken[0]]))
+                else:
+                    self._work[now_at[taken[0]]] = function.instruction_constant(step)
+                continue
+            if code not in _OPERATIONS:
+                raise NotImplementedError(f"CasADi's operation {code} over all rows")
+            places = [now_at[place] for place in given]
+            now_at[taken[0]] = taken[0]
+            self._program.append((_OPERATIONS[code], places[0], [*places, ALONE][1], taken[0]))
 
     def __call__(self, *arguments: Array) -> list[Array]:
         """The results, each (N, rows, columns)."""
@@ -79,20 +97,19 @@ class AllRows:
         results = [np.zeros((count, *shape)) for shape in self._shapes]
         for first in range(0, count, MOST_ROWS):
             here = slice(first, first + MOST_ROWS)
-            given = [list(a[:, here] if a.ndim == 2 else a) for a in arguments]
+            work = self._work.copy()
+            for argument, component, place in self._given:
+                value = arguments[argument][component]
+                work[place] = value[here] if value.ndim else float(value)
             with np.errstate(all="ignore"):  # a run that leaves the numbers is seen by its size
-                self._evaluate(given, [result[here] for result in results])
+                for operation, one, other, place in self._program:
+                    work[place] = (
+                        operation(work[one]) if other == ALONE else operation(work[one], work[other])
+                    )
+            for result, row, column, place in self._results:
+                results[result][here, row, column] = work[place]
         return results
 
-    def _evaluate(self, arguments: list[list[Array]], results: list[Array]) -> None:
-        work: dict[int, Array | float] = {}
-        for code, operation, constant, given, taken in self._program:
-            if operation is not None:
-                work[taken[0]] = operation(*[work[place] for place in given])
-            elif code == ca.OP_INPUT:
-                work[taken[0]] = arguments[given[0]][given[1]]
-            elif code == ca.OP_CONST:
-                work[taken[0]] = constant
-            else:
-                row, column = self._places[taken[0]][taken[1]]
-                results[taken[0]][:, row, column] = work[given[0]]
+    def _new_place(self) -> int:
+        self._work.append(0.0)
+        return len(self._work) - 1

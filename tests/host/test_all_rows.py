@@ -32,5 +32,5 @@ def test_matrices_keep_their_shape_and_rows_beyond_one_batch_are_there() -> None
 
 def test_an_unknown_operation_is_refused() -> None:
     x = ca.SX.sym("x")
-    with pytest.raises(NotImplementedError, match="operations"):
+    with pytest.raises(NotImplementedError, match="operation"):
         AllRows(ca.Function("erf", [x], [ca.erf(x)]))
