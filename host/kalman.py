@@ -30,7 +30,7 @@ def _kalman(form: Form) -> ca.Function:
     reduced = ca.SX.eye(form.nx) - K @ C
     P_updated = reduced @ P @ reduced.T + K @ ca.diag(noise[:2]) @ K.T
     before = ca.SX.sym("before", form.nx)
-    after = form.step(before, p, drive)
+    *_, after = form.step(before, p, drive)
     A = ca.Function("A", [before, p, drive], [after, ca.jacobian(after, before)])
     x_next, Ax = A(updated, p, drive)
     density = ca.SX(form.nx, 1)

@@ -103,29 +103,36 @@ class Form:
     def symbols(self) -> tuple[ca.SX, ca.SX, ca.SX]:
         return ca.SX.sym("x", self.nx), ca.SX.sym("p", self.np), ca.SX.sym("drive", self.drives)
 
-    def step(self, x: ca.SX, p: ca.SX, drive: ca.SX) -> ca.SX:
-        """The state one row later."""
+    def step(self, x: ca.SX, p: ca.SX, drive: ca.SX) -> list[ca.SX]:
+        """The state after each sub-step; after the last it is that one row later."""
+        after = []
+        for k in range(self.substeps):
+            x = self.substep(x, p, drive, k)
+            after.append(x)
+        return after
+
+    def substep(self, x: ca.SX, p: ca.SX, drive: ca.SX, k: int | ca.SX) -> ca.SX:
+        """The state after sub-step k of a row, counted from 0."""
         h = drive[3] / self.substeps
         states = self.structure.states
         slope = _slope(self)
-        for k in range(self.substeps):
-            time = drive[4] + k * h
-            at_start = self.structure.chain(x, p, drive, time)
-            moved = self.structure.actuate(at_start, h)
-            plane, half = at_start.plane, at_start.change / 2
-            k1 = slope(x, time, plane - half, p, drive)
-            k2 = slope(x + h / 2 * k1, time + h / 2, plane, p, drive)
-            k3 = slope(x + h / 2 * k2, time + h / 2, plane, p, drive)
-            k4 = slope(x + h * k3, time + h, plane + half, p, drive)
-            before, x = x, x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-            for name, value in moved.items():
-                x[states.index(name)] = value
-            for name, followed, lag in self.structure.followers:
-                own, time_constant = states.index(name), p[self.structure.names.index(lag)]
-                start, slope_then = _followed(self, followed)(before, k1, p, drive)
-                end, slope_now = _followed(self, followed)(x, k4, p, drive)
-                bend = (slope_now - slope_then) / (2 * h)
-                x[own] = _behind(before[own], start, end, bend, time_constant, h)
+        time = drive[4] + k * h
+        at_start = self.structure.chain(x, p, drive, time)
+        moved = self.structure.actuate(at_start, h)
+        plane, half = at_start.plane, at_start.change / 2
+        k1 = slope(x, time, plane - half, p, drive)
+        k2 = slope(x + h / 2 * k1, time + h / 2, plane, p, drive)
+        k3 = slope(x + h / 2 * k2, time + h / 2, plane, p, drive)
+        k4 = slope(x + h * k3, time + h, plane + half, p, drive)
+        before, x = x, x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        for name, value in moved.items():
+            x[states.index(name)] = value
+        for name, followed, lag in self.structure.followers:
+            own, time_constant = states.index(name), p[self.structure.names.index(lag)]
+            start, slope_then = _followed(self, followed)(before, k1, p, drive)
+            end, slope_now = _followed(self, followed)(x, k4, p, drive)
+            bend = (slope_now - slope_then) / (2 * h)
+            x[own] = _behind(before[own], start, end, bend, time_constant, h)
         return x
 
     def outputs(self, x: ca.SX, p: ca.SX, drive: ca.SX) -> ca.SX:
@@ -173,9 +180,8 @@ def _initial(form: Form) -> ca.Function:
 @cache
 def _free_run(form: Form) -> ca.Function:
     x, p, drive = form.symbols()
-    return ca.Function(
-        "free_run", [x, drive, p], [form.step(x, p, drive), ca.vertcat(x, form.outputs(x, p, drive))]
-    )
+    *within, after = form.step(x, p, drive)
+    return ca.Function("free_run", [x, drive, p], [after, ca.vertcat(x, *within, form.outputs(x, p, drive))])
 
 
 OverRows = Callable[[Array, Array, Array], Array]
@@ -235,10 +241,16 @@ def start_of(form: Form, parameters: Array, initial: Array, inputs: Inputs) -> t
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """States (nx, N) and outputs pitch, depth (2, N)."""
+    """What a vehicle did over N rows.
+
+    states   (nx, N)
+    outputs  (2, N) pitch and depth
+    within   (substeps, nx, N) states from which the sub-steps begin
+    """
 
     states: Array
     outputs: Array
+    within: Array
 
 
 def free_run(parameters: Array, initial: Array, inputs: Inputs) -> Run:
@@ -246,4 +258,5 @@ def free_run(parameters: Array, initial: Array, inputs: Inputs) -> Run:
     form = form_of(inputs)
     start, _ = start_of(form, parameters, initial, inputs)
     table = over_rows(_free_run, form, inputs.drive.shape[1])(start, inputs.drive, parameters)
-    return Run(states=table[: form.nx], outputs=table[form.nx :])
+    within = table[:-2].reshape((form.substeps, form.nx, -1))
+    return Run(states=within[0], outputs=table[-2:], within=within)

@@ -43,13 +43,9 @@ def sensitivities(
     _, start = start_of(form, parameters, initial, inputs)
     with np.errstate(all="ignore"):  # a run that leaves the numbers is seen by its size
         hx, hp = _output_slopes(form)(run.states, parameters, inputs.drive)
-        if gains is None:
-            Fx, Fp = _step_slopes(form)(run.states, parameters, inputs.drive)
-        else:
-            K = gains.T.reshape((rows, 2, form.nx)).transpose(0, 2, 1)
-            corrected = run.states + (K @ (inputs.measured - run.outputs).T[:, :, None])[:, :, 0].T
-            Fx, Fp = _step_slopes(form)(corrected, parameters, inputs.drive)
-            FK = Fx @ K
+        Fx, Fp = _slopes_of_rows(form, run, parameters, inputs.drive)
+        if gains is not None:
+            FK = Fx @ gains.T.reshape((rows, 2, form.nx)).transpose(0, 2, 1)
             Fx, Fp = Fx - FK @ hx, Fp - FK @ hp
         seen = hx @ _recursion(Fx, Fp, start)
         seen[:, :, : form.np] += hp
@@ -62,7 +58,20 @@ def _steered(parameters: Array, initial: Array, inputs: Inputs, gains: Array) ->
     start, _ = start_of(form, parameters, initial, inputs)
     per_step = np.vstack([inputs.drive, inputs.measured, gains])
     table = over_rows(_steered_run, form, inputs.drive.shape[1])(start, per_step, parameters)
-    return Run(states=table[: form.nx], outputs=table[form.nx :])
+    states, outputs, within = np.split(table, [form.nx, form.nx + 2])
+    return Run(states=states, outputs=outputs, within=within.reshape((form.substeps, form.nx, -1)))
+
+
+def _slopes_of_rows(form: Form, run: Run, parameters: Array, drive: Array) -> tuple[Array, Array]:
+    """F_x (N, nx, nx) and F_p (N, nx, parameters) from row to row, those of the sub-steps chained."""
+    rows, substeps = drive.shape[1], form.substeps
+    states, number = np.hstack(list(run.within)), np.repeat(np.arange(float(substeps)), rows)[None]
+    slopes = _substep_slopes(form)(states, parameters, np.tile(drive, substeps), number)
+    each = [slope.reshape((substeps, rows, *slope.shape[1:])) for slope in slopes]
+    Fx, Fp = each[0][0], each[1][0]
+    for by_state, by_parameter in zip(each[0][1:], each[1][1:], strict=True):
+        Fx, Fp = by_state @ Fx, by_state @ Fp + by_parameter
+    return Fx, Fp
 
 
 def _recursion(Fx: Array, Fp: Array, start: Array) -> Array:
@@ -76,21 +85,23 @@ def _recursion(Fx: Array, Fp: Array, start: Array) -> Array:
 
 @cache
 def _steered_run(form: Form) -> ca.Function:
-    """One step of the innovations form; gives x and h(x)."""
+    """One step of the innovations form; gives x, h(x) and where the sub-steps begin."""
     x, p, drive = form.symbols()
     measured, gain = ca.SX.sym("measured", 2), ca.SX.sym("gain", form.nx * 2)
     y = form.outputs(x, p, drive)
     corrected = x + ca.reshape(gain, form.nx, 2) @ (measured - y)
-    per_step = ca.vertcat(drive, measured, gain)
-    return ca.Function("steered_run", [x, per_step, p], [form.step(corrected, p, drive), ca.vertcat(x, y)])
+    *within, after = form.step(corrected, p, drive)
+    per_step, result = ca.vertcat(drive, measured, gain), ca.vertcat(x, y, corrected, *within)
+    return ca.Function("steered_run", [x, per_step, p], [after, result])
 
 
 @cache
-def _step_slopes(form: Form) -> AllRows:
-    """F_x (nx, nx) and F_p (nx, parameters) of one step."""
-    x, p, drive = form.symbols()
-    after = form.step(x, p, drive)
-    return AllRows(ca.Function("step", [x, p, drive], ca.cse([ca.jacobian(after, x), ca.jacobian(after, p)])))
+def _substep_slopes(form: Form) -> AllRows:
+    """F_x (nx, nx) and F_p (nx, parameters) of one sub-step."""
+    (x, p, drive), number = form.symbols(), ca.SX.sym("number")
+    after = form.substep(x, p, drive, number)
+    slopes = [ca.jacobian(after, x), ca.jacobian(after, p)]
+    return AllRows(ca.Function("substep", [x, p, drive, number], slopes))
 
 
 @cache
