@@ -67,6 +67,10 @@ class GaussNewton:
         step = self._reached(reduced, rhs, damping=1e-9) - self.point.parameters[self.free]
         return left - float(step @ (2.0 * rhs - reduced @ step))
 
+    def promise(self) -> float:
+        """What the full step would gain in log-likelihood if the equations were linear."""
+        return -0.5 * self.predicted_cost(0.0)
+
     def information(self) -> Array:
         """Fisher information of the free parameters alone."""
         reduced = self.H.copy()

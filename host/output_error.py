@@ -24,6 +24,8 @@ from host.sensitivities import sensitivities
 SMALLEST_NOISE = np.array([1e-12, 1e-10])
 RUNAWAY = 1e7  # of a sensitivity, in SI: the model leaves the recording exponentially
 LOST = 1e12  # rad^2, m^2: a run that leaves the recording needs no likelihood of its rounding
+PROMISED = 10.0  # times the tolerance: what an undamped step may promise where nothing more is gained
+LEAST_DAMPING = 1e-9  # once a step was refused: curved valleys are far narrower than they are long
 ANNEALING = (0.1, 0.01, 1e-3, 1e-4)  # s, variance of the unknown force over that of all force
 
 
@@ -46,11 +48,12 @@ def output_error(
             trial_noise, trial_cost = _likeliest_noise(_errors(runs, inputs), inputs)
             if trial_cost < cost or damping > 1e8:
                 break
-            damping = max(damping * 8.0, 1e-6)
+            damping = max(damping * 8.0, LEAST_DAMPING)
         if not trial_cost < cost:
             converged = True
             break
-        converged = cost - trial_cost < tolerance
+        # In a curved valley steps are short, and gain little, while much is left to gain.
+        converged = cost - trial_cost < tolerance and step.promise() < PROMISED * tolerance
         cost, point, noise = trial_cost, trial, trial_noise
         parts = _innovations(point, runs, inputs)
         damping = damping / 10.0

@@ -3,7 +3,7 @@
 from math import log
 from typing import TYPE_CHECKING
 
-from host.catalogue import BY_NAME, CATALOGUE, named
+from host.catalogue import BY_NAME, CATALOGUE, ORDINARY, named
 from host.catalogue.kin import OFFSETS, PITCHING_INTO_DEPTH, measure_alike
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.margins import FEW, LARGEST_SET, NAMING_MARGIN, SMALL, TWIN_MARGIN, margin
@@ -28,7 +28,9 @@ def exchanged(search: "Search", best: Explanation) -> Explanation:
     for smaller in fewer:
         (member,) = best.names - smaller.names
         kin = {e.name for e in CATALOGUE if _is_kin(search, e.name, member)}
-        gains = search.gains(smaller, is_small, kin if is_large else None)
+        # In a large set a rare member may stand for a common one that joined too late.
+        fair = kin if named(member).is_common else kin | {*ORDINARY}
+        gains = search.gains(smaller, is_small, fair if is_large else None)
         rivals = _likely(gains, smaller.bic - best.bic, RIVALS if is_small else FEW)
         kin &= gains.keys()
         rivals |= kin if is_small else {name for name in kin if measure_alike(named(name), named(member))}

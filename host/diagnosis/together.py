@@ -47,13 +47,21 @@ def completed(search: "Search", best: Explanation) -> Explanation:
 
     One at a time they may promise nothing, where the set is bent to do without them.
     """
-    # One that joined later was fitted beside all that was left then.
-    was_joint = any(len(best.names - names - {*OFFSETS}) <= 1 for names in search.joint)
-    if len(best.names) <= SMALL or was_joint or search.root.fit.has_process_noise:
+    if len(best.names) <= SMALL or _was_joint(search, best) or search.root.fit.has_process_noise:
         return best
     search.on_progress("what every vehicle has beside it")
     (joint,) = search.across([with_ordinary(search, best)])
     return min(best, pruned(search, joint), key=lambda e: e.bic)
+
+
+def _was_joint(search: "Search", best: Explanation) -> bool:
+    """Whether all that every vehicle has was fitted with it, and not in a poorer valley than it is in now."""
+    least = best.fit.log_likelihood
+    # One that joined later was fitted beside all that was left then.
+    return any(
+        len(best.names - names - {*OFFSETS}) <= 1 and search.tried[names].fit.log_likelihood > least
+        for names in search.joint
+    )
 
 
 def with_ordinary(search: "Search", explanation: Explanation) -> Explanation:
