@@ -9,6 +9,7 @@ from scipy.linalg import cho_factor, cho_solve
 from host.equations import Structure
 from host.propagate import NX0
 from host.recording import Array
+from host.straightened import slopes, stepped
 
 Mask = NDArray[np.bool_]
 INITIAL_STATE_PRIOR = np.array([1.0, 1.0, 1.0, 100.0])  # std of w, q, theta, zeta; keeps short dives solvable
@@ -64,7 +65,8 @@ class GaussNewton:
         """Deviance, of `cost` here, after the full step if the equations were linear."""
         reduced, rhs = self._reduced()
         left = cost - sum(float(gx @ np.linalg.solve(Hxx, gx)) for _, Hxx, gx in self.own)
-        step = self._reached(reduced, rhs, damping=1e-9) - self.point.parameters[self.free]
+        scale = np.sqrt(np.maximum(np.diag(self.H), 1e-300))
+        step = self._reached(reduced, rhs, 1e-9, scale) - self.point.parameters[self.free]
         return left - float(step @ (2.0 * rhs - reduced @ step))
 
     def promise(self) -> float:
@@ -87,13 +89,21 @@ class GaussNewton:
         ]
 
     def trial(self, damping: float) -> Point:
-        """The point one damped step on (Levenberg-Marquardt), inside the parameters' bounds."""
+        """The point one damped step on (Levenberg-Marquardt), inside the parameters' bounds.
+
+        In the coordinates of host.straightened.
+        """
         reduced, rhs = self._reduced()
         if not np.isfinite(reduced).all():
             return self.point  # the model has run away: no step is better than none
-        parameters = self.point.parameters.copy()
-        parameters[self.free] = self._reached(reduced, rhs, damping)
-        moved = parameters[self.free] - self.point.parameters[self.free]
+        names, here = self.point.structure.names, self.point.parameters
+        T = slopes(names, here)[np.ix_(self.free, self.free)]
+        scale = np.sqrt(np.maximum(np.diag(T.T @ self.H @ T), 1e-300))
+        step = np.zeros(here.size)
+        step[self.free] = self._reached(T.T @ reduced @ T, T.T @ rhs, damping, scale) - here[self.free]
+        parameters = self.point.structure.clipped(stepped(names, here, step))
+        parameters[~self.free] = here[~self.free]
+        moved = parameters[self.free] - here[self.free]
         initial = [
             x0 + np.linalg.solve(Hxx * (1.0 + damping * np.eye(NX0)), gx - Hpx.T @ moved)
             for x0, (Hpx, Hxx, gx) in zip(self.point.initial, self.own, strict=True)
@@ -107,9 +117,8 @@ class GaussNewton:
             rhs -= Hpx @ np.linalg.solve(Hxx, gx)
         return self.information(), rhs
 
-    def _reached(self, reduced: Array, rhs: Array, damping: float) -> Array:
+    def _reached(self, reduced: Array, rhs: Array, damping: float, scale: Array) -> Array:
         """Free parameters after a damped step; what would leave its bounds stops there, others suit that."""
-        scale = np.sqrt(np.maximum(np.diag(self.H), 1e-300))
         normal = reduced / np.outer(scale, scale) + damping * np.eye(scale.size)
         bounds, here = self.point.structure.parameters, self.point.parameters[self.free]
         lower = np.array([p.lower for p in bounds])[self.free]

@@ -40,7 +40,7 @@ RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exac
 LONELY = 8.0  # of BIC, against what seldom acts without another effect that is not there: odds of 50 to 1
 COMPRESSED = "depth_dependent_buoyancy"
 # Enough to rank sets; those that count are polished.
-FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 12, 0.2
+FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 25, 0.2
 EXACT, SETTLED = 1e-3, 0.005  # of a log-likelihood, that an iteration of a polished fit may still gain
 NOT_THERE = 1.2  # times the sensor noise that the set left elsewhere: it has ended in another valley
 HOPELESS = 0.1  # of a log-likelihood per sample

@@ -11,7 +11,7 @@ from host.gauss_newton import GaussNewton, Point
 
 STRUCTURE = structure_of(("heave_quadratic_drag", "large_angle_kinematics"))
 NAMES = list(STRUCTURE.names)
-FREE = np.array([name in ("a1", "c_ww", "kinematics_share") for name in NAMES])
+FREE = np.array([name in ("u0", "c_ww", "kinematics_share") for name in NAMES])
 DRAG, SHARE = NAMES.index("c_ww"), NAMES.index("kinematics_share")
 
 
@@ -26,7 +26,8 @@ def linear_problem(seed: int, drag: float, share: float) -> tuple[GaussNewton, n
     S = scores[:, : len(NAMES)][:, FREE].transpose(1, 0, 2).reshape(3, -1)
     error = (S.T @ wanted).reshape(2, 200) + 0.01 * rng.standard_normal((2, 200))
     values = np.zeros(len(NAMES))
-    values[NAMES.index("a1")], values[DRAG], values[SHARE] = -1.0, drag, share
+    values[NAMES.index("a1")], values[NAMES.index("a2")] = -1.0, -1.0
+    values[NAMES.index("u0")], values[DRAG], values[SHARE] = 2.0, drag, share
     point = Point(STRUCTURE, values, [np.zeros(4)], np.array([1.0, 1.0, 0.0, 0.0]))
     return GaussNewton([(error, scores)], point, FREE), S.T, error.ravel()
 

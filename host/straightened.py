@@ -1,0 +1,55 @@
+"""Coordinates in which the valleys of the likelihood are nearly straight.
+
+A vehicle whose damping and whose forces grow together turns into the same steady motion, only sooner; what a
+recording tells about how soon it tells with little certainty, and a lag of the servo blurs it. So the
+coefficients of heave go together with a1, those of pitch with a2, along curved valleys. A step d from
+coefficients p is therefore taken as
+
+    a -> a exp(d_a / a),    c -> (c + d_c) exp(d_a / a)    for every coefficient c of the equation of a,
+
+which is d itself plus c d_a / a to first order.
+"""
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+
+from host.recording import Array
+
+LARGEST = 2.0  # of a logarithm, in one step
+EQUATIONS = {
+    "a1": ("b1", "heave_offset", "trim_heave"),
+    "a2": ("a3", "b2", "pitch_offset", "trim_pitch"),
+}
+PREFIXES = {"a1": "c_w", "a2": "c_q"}  # of the coefficients that the catalogue adds
+
+
+def slopes(names: tuple[str, ...], parameters: Array) -> Array:
+    """Derivatives (n, n) of the parameters by a step, where it begins."""
+    table = np.eye(len(names))
+    for damping, own in _equations(names):
+        table[own, damping] = parameters[own] / parameters[damping]
+    return table
+
+
+def stepped(names: tuple[str, ...], parameters: Array, step: Array) -> Array:
+    """The parameters (n,) one step on."""
+    after = parameters + step
+    for damping, own in _equations(names):
+        growth = np.exp(np.clip(step[damping] / parameters[damping], -LARGEST, LARGEST))
+        after[damping] = parameters[damping] * growth
+        after[own] *= growth
+    return after
+
+
+@cache
+def _equations(names: tuple[str, ...]) -> list[tuple[int, Sequence[int]]]:
+    """Where the damping and the coefficients of heave and of pitch are."""
+    return [
+        (
+            names.index(damping),
+            [k for k, name in enumerate(names) if name in named or name.startswith(PREFIXES[damping])],
+        )
+        for damping, named in EQUATIONS.items()
+    ]

@@ -1,0 +1,90 @@
+"""A fit whose optimum lies far along a narrow, curved valley is followed there."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from host import gauss_newton
+from host.catalogue import structure_of
+from host.gauss_newton import Point
+from host.output_error import output_error
+from host.propagate import free_run, inputs_of
+from host.recording import Recording
+from host.straightened import slopes, stepped
+
+# A lag of the servo and a moment of heave: pitch damping, restoring and plane moment can rise together.
+TRUTH = {
+    "a1": -3.9, "a2": -7.0, "a3": -0.29, "b1": -0.65, "b2": -3.2, "u0": 3.2,
+    "c_qw": 1.3, "c_qq": -3.5, "lag_time": 0.11,
+}  # fmt: skip
+NEAR_THE_OTHER_END = {"a2": -4.7, "a3": -0.206, "b1": -0.58, "b2": -2.37, "c_qw": 0.0, "c_qq": -2.6}
+
+
+@pytest.fixture(scope="module")
+def start_and_recording() -> tuple[Point, Recording]:
+    rng = np.random.default_rng(5)
+    rows, step = 1600, 0.125
+    rudder, at = np.empty(rows), 0
+    while at < rows:
+        until = at + int(rng.uniform(8, 60))
+        rudder[at:until] = rng.uniform(-0.06, 0.06)
+        at = until
+    nan = np.full(rows, np.nan)
+    structure = structure_of(("munk_moment", "pitch_quadratic_damping", "actuator_lag"))
+    blank = Recording(
+        name="valley.csv", sha256="0" * 64, time=np.arange(rows) * step, depth=np.zeros(rows),
+        pitch=np.zeros(rows), rudder=rudder, speed=np.full(rows, 3.2), pitch_rate=nan, step=step,
+    )  # fmt: skip
+    truth = np.array([TRUTH.get(name, 0.0) for name in structure.names])
+    outputs = free_run(truth, np.array([0.0, 0.0, 0.0, 20.0]), inputs_of(blank, structure)).outputs
+    outputs += np.array([[2e-3], [9e-3]]) * rng.standard_normal(outputs.shape)
+    recording = Recording(
+        name="valley.csv", sha256="0" * 64, time=blank.time, depth=outputs[1], pitch=outputs[0],
+        rudder=rudder, speed=blank.speed, pitch_rate=nan, step=step,
+    )  # fmt: skip
+    values = {**TRUTH, **NEAR_THE_OTHER_END, "lag_time": 0.08}
+    parameters = np.array([values.get(name, 0.0) for name in structure.names])
+    initial = [np.array([0.0, 0.0, outputs[0, 0], outputs[1, 0]])]
+    return Point(structure, parameters, initial, np.array([4e-6, 8e-5, 0.0, 0.0])), recording
+
+
+def _fits(start: Point, recording: Recording) -> tuple[float, float]:
+    inputs = [inputs_of(recording, start.structure)]
+    names = start.structure.names
+    free = np.array([name not in ("u0", "heave_offset", "pitch_offset") for name in names])
+    reached = output_error(start, inputs, free, 40, 0.005)
+    truth = Point(start.structure, np.array([TRUTH.get(n, 0.0) for n in names]), start.initial, start.noise)
+    best = output_error(truth, inputs, free, 200, 1e-9)
+    print(
+        reached.iterations, reached.log_likelihood - best.log_likelihood, reached.parameters, best.parameters
+    )
+    return reached.log_likelihood, best.log_likelihood
+
+
+def test_it_is_followed_to_its_end(start_and_recording: tuple[Point, Recording]) -> None:
+    reached, best = _fits(*start_and_recording)
+    assert reached > best - 0.1
+
+
+def test_in_plain_coordinates_it_would_take_far_longer(
+    start_and_recording: tuple[Point, Recording], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(gauss_newton, "slopes", lambda names, _: np.eye(len(names)))
+    monkeypatch.setattr(gauss_newton, "stepped", lambda _, parameters, step: parameters + step)
+    reached, best = _fits(*start_and_recording)
+    assert reached < best - 0.5
+
+
+@given(st.lists(st.floats(-0.5, 0.5), min_size=10, max_size=10))
+def test_a_step_is_what_its_slopes_say_and_keeps_the_signs_of_damping(moves: list[float]) -> None:
+    names = structure_of(("heave_quadratic_drag", "munk_moment")).names
+    values = np.array([TRUTH.get(name, -0.4) for name in names])
+    step = np.array(moves[: values.size])
+    there = stepped(names, values, 1e-6 * step)
+    np.testing.assert_allclose((there - values) / 1e-6, slopes(names, values) @ step, atol=1e-5)
+    far = stepped(names, values, 20.0 * step)
+    assert far[0] < 0.0
+    assert far[1] < 0.0
+    kept = [name in ("u0",) for name in names]
+    np.testing.assert_array_equal(far[kept], (values + 20.0 * step)[kept])
