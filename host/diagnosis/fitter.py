@@ -41,6 +41,7 @@ LONELY = 8.0  # of BIC, against what seldom acts without another effect that is 
 COMPRESSED = "depth_dependent_buoyancy"
 # Enough to rank sets; those that count are polished.
 FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 25, 0.2
+PATIENT_ITERATIONS = 20  # from a point of another valley, which may lie far up its side
 EXACT, SETTLED = 1e-3, 0.005  # of a log-likelihood, that an iteration of a polished fit may still gain
 NOT_THERE = 1.2  # times the sensor noise that the set left elsewhere: it has ended in another valley
 HOPELESS = 0.1  # of a log-likelihood per sample
@@ -189,7 +190,8 @@ class Fitter:
         again = look_alikes(end) if named(name).parameters[0].name in SHARING_POLES else []
         if not has_usual_heave(end):
             again += with_usual_heave(end)
-        fit = max([fit, *(self._fit([start], hopeless(fit)) for start in again)], key=plausibility)
+        others = [self._fit([start], hopeless(fit), PATIENT_ITERATIONS) for start in again]
+        fit = max([fit, *others], key=plausibility)
         if named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
             fit = self._fit([idle(starts[0], name)])
         return self._explained(parent.names | {name}, fit)
@@ -314,14 +316,14 @@ class Fitter:
         structure = structure_of(names)
         return Point(structure, np.array([known[name] for name in structure.names]), fit.initial, fit.levels)
 
-    def _fit(self, starts: list[Point], least: float = -np.inf) -> Fit:
+    def _fit(self, starts: list[Point], least: float = -np.inf, first: int = FIRST_ITERATIONS) -> Fit:
         """Goes a few steps from every start, and on from the best where that is at least so likely."""
         structure = starts[0].structure
         names = frozenset(effect.name for effect in structure.effects)
         inputs, free = self.inputs(names), self.free(names)
         if starts[0].noise[2:].any():
             return self._carried_on(starts[0])
-        fits = [output_error(start, inputs, free, FIRST_ITERATIONS, TOLERANCE) for start in starts]
+        fits = [output_error(start, inputs, free, first, TOLERANCE) for start in starts]
         best = max(fits, key=lambda fit: fit.log_likelihood)
         if best.log_likelihood < least:
             return best

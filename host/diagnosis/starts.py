@@ -13,6 +13,7 @@ from host.catalogue import named
 from host.catalogue.kin import measure_alike
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import first_guess
+from host.diagnosis.margins import LARGEST_SET
 from host.diagnosis.prospects import probed
 from host.equations import NAMES
 from host.gauss_newton import Point
@@ -35,10 +36,11 @@ def starts_of(
 ) -> list[Point]:
     """Starts of the parent's set with one effect more, the most promising first; see Fitter.grown."""
     likely = sorted(probed(fitter, parent, named(name), values), key=lambda pair: -pair[0])
+    del likely[1 if len(parent.names) >= LARGEST_SET else 2 :]  # fits of large sets cost most
     names = parent.names | {name}
-    starts = [fitter.point(names, parent, name, probe) for _, probe in likely[:2]]
+    starts = [fitter.point(names, parent, name, probe) for _, probe in likely]
     if rival is not None:
-        probes = [probe for _, probe in likely[:2]] + _same_size(fitter, rival, parent, name)
+        probes = [probe for _, probe in likely] + _same_size(fitter, rival, parent, name)
         return starts + [fitter.point(names, rival, name, probe) for probe in probes]
     guesses = [guess(fitter, starts[0], names)] if may_be_bent(fitter, parent) else []
     if is_far(fitter, parent):
