@@ -73,23 +73,23 @@ class AllRows:
         for step in range(function.n_instructions()):
             code, taken = function.instruction_id(step), function.instruction_output(step)
             given = function.instruction_input(step)
-            if code == ca.OP_OUTPUT:
-                result, entry = taken
-                self._results.append((result, *entries[result][entry], self._new_place()))
-                self._program.append((_same, now_at[given[0]], ALONE, self._results[-1][3]))
-                continue
-            if code in (ca.OP_INPUT, ca.OP_CONST):
+            if code == ca.OP_INPUT:
                 now_at[taken[0]] = self._new_place()
-                if code == ca.OP_INPUT:
-                    self._given.append((given[0], given[1], now_at[taken[0]]))
-                else:
-                    self._work[now_at[taken[0]]] = function.instruction_constant(step)
-                continue
-            if code not in _OPERATIONS:
+                self._given.append((given[0], given[1], now_at[taken[0]]))
+            elif code == ca.OP_CONST:
+                now_at[taken[0]] = self._new_place()
+                self._work[now_at[taken[0]]] = function.instruction_constant(step)
+            elif code == ca.OP_OUTPUT:
+                result, entry = taken
+                place = self._new_place()
+                self._results.append((result, *entries[result][entry], place))
+                self._program.append((_same, now_at[given[0]], ALONE, place))
+            elif code in _OPERATIONS:
+                one, other = [*(now_at[place] for place in given), ALONE][:2]
+                now_at[taken[0]] = taken[0]
+                self._program.append((_OPERATIONS[code], one, other, taken[0]))
+            else:
                 raise NotImplementedError(f"CasADi's operation {code} over all rows")
-            places = [now_at[place] for place in given]
-            now_at[taken[0]] = taken[0]
-            self._program.append((_OPERATIONS[code], places[0], [*places, ALONE][1], taken[0]))
 
     def __call__(self, *arguments: Array) -> list[Array]:
         """The results, each (N, rows, columns)."""
