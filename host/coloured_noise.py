@@ -150,4 +150,5 @@ def _through(gain: Array, decay: Array, values: Array) -> Array:
     bands[1, :-1] = -decay[:-1] * (1.0 - gain[:-1])
     driven = np.zeros_like(values)
     driven[:, 1:] = (decay * gain * values)[:, :-1]
-    return np.asarray(values - solve_banded((1, 0), bands, driven.T).T)
+    # A trial may run away: what is infinite is refused by its likelihood.
+    return np.asarray(values - solve_banded((1, 0), bands, driven.T, check_finite=False).T)

@@ -23,6 +23,7 @@ from host.sensitivities import sensitivities
 # rad^2, m^2: below any sensor, so that noise-free data divide by no zero
 SMALLEST_NOISE = np.array([1e-12, 1e-10])
 RUNAWAY = 1e7  # of a sensitivity, in SI: the model leaves the recording exponentially
+USUAL_DURATION = 300.0  # s; over longer ones sensitivities may be larger
 LOST = 1e12  # rad^2, m^2: a run that leaves the recording needs no likelihood of its rounding
 PROMISED = 10.0  # times the tolerance: what an undamped step may promise where nothing more is gained
 LEAST_DAMPING = 1e-9  # once a step was refused: curved valleys are far narrower than they are long
@@ -37,7 +38,7 @@ def output_error(
     runs = _free_runs(point, inputs)
     noise, cost = _likeliest_noise(_errors(runs, inputs), inputs)
     parts = _innovations(point, runs, inputs)
-    if not np.isfinite(cost) or not all(np.abs(S).max() < RUNAWAY for _, S in parts):
+    if not np.isfinite(cost) or runs_away(parts, inputs):
         return run_away(point, inputs, free)
     while not converged and iterations < most_iterations:
         iterations += 1
@@ -78,10 +79,20 @@ def annealed(start: Point, inputs: list[Inputs], free: Mask, accelerations: tupl
         for _ in range(2):
             with np.errstate(all="ignore"):
                 white = whitened_innovations(point, inputs)
-                if not all(np.abs(S).max() < 1e3 * RUNAWAY for _, S in white):
+                if runs_away(white, inputs, 1e3):
                     return start
                 point = GaussNewton(white, point, free).trial(1e-6)
     return point.with_noise(start.noise)
+
+
+def runs_away(parts: list[tuple[Array, Array]], inputs: list[Inputs], scale: float = 1.0) -> bool:
+    """Whether a model leaves its recordings exponentially, by sensitivities (2, parameters + 4, N) of each.
+
+    Without restoring, those of depth to a moment grow with the cube of time.
+    """
+    durations = [float(one.drive[4, -1] - one.drive[4, 0]) for one in inputs]
+    limits = [scale * RUNAWAY * max(1.0, duration / USUAL_DURATION) ** 3 for duration in durations]
+    return not all(np.abs(S).max() < limit for (_, S), limit in zip(parts, limits, strict=True))
 
 
 def free_run_cost(point: Point, inputs: list[Inputs]) -> float:
