@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 from host.equations import NAMES
 from host.identifiability import undetermined
 from host.maximum_likelihood import fit_maximum_likelihood
+from host.output_error import RUNAWAY, runs_away
 from host.propagate import free_run, inputs_of
+from host.sensitivities import innovations
 from host.uncertainty import covariance
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
@@ -24,6 +26,19 @@ def test_noise_free_recording_gives_the_vehicle_back() -> None:
     fit = fit_maximum_likelihood([recording])
     assert fit.converged
     assert np.allclose(fit.parameters, TRUTH, rtol=1e-3, atol=2e-5)
+
+
+def test_a_long_dive_of_a_vehicle_that_hardly_restores_itself_is_no_runaway() -> None:
+    slow = (-0.02, -1e-3, -3e-5, 0.01, 1e-4, 0.3)
+    recording, states = fly(Dive(vehicle=slow, step=4.0, duration=3000.0, amplitude=0.3))
+    inputs = [inputs_of(recording)]
+    _, sensitivity = innovations(np.array([*slow, 0.0, 0.0]), states[:, 0], inputs[0])
+    assert np.abs(sensitivity).max() > RUNAWAY
+    assert not runs_away([(np.zeros(0), sensitivity)], inputs)
+    diverging = np.array([*slow, 0.0, 0.0])
+    diverging[2] = 1e-3
+    _, sensitivity = innovations(diverging, states[:, 0], inputs[0])
+    assert runs_away([(np.zeros(0), sensitivity)], inputs)
 
 
 def test_noisy_recording_is_unbiased_where_car_regression_fails() -> None:

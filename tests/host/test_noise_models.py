@@ -47,6 +47,16 @@ def test_likelihood_of_wandering_sensors_equals_dense_algebra_with_samples_missi
     assert here.likelihood == pytest.approx(dense, rel=1e-9)
 
 
+def test_a_trial_that_runs_away_among_wandering_sensors_is_refused() -> None:
+    recording, states = fly(Dive(duration=600.0, step=0.5))
+    inputs = inputs_of(recording)
+    diverging = TRUTH.copy()
+    diverging[1:3] = -1e-4, 5.0
+    noise = np.array([3e-6, 1e-4, 2e-6, 9e-4, 0.4, 2.0])
+    there = place(Point(inputs.structure, diverging, [states[:, 0]], noise), WanderingSensors([inputs]))
+    assert there.likelihood == -np.inf
+
+
 def test_wandering_depth_is_not_taken_for_force() -> None:
     fit = fit_maximum_likelihood([with_wandering_depth()])
     assert fit.has_coloured_noise
