@@ -13,6 +13,7 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import Leftover, leftover
 from host.diagnosis.locate import Location, locate
+from host.diagnosis.pruning import leanest
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.search import Search
 from host.diagnosis.seas import WAVES, Waves, among_waves, in_a_sea
@@ -158,6 +159,8 @@ def _explain(
         if part is None or part.waves is not None:
             search, best, waves = among_waves(search, best, calm)
         left = leftover(fitter, best if waves is None else waves.fitted)
+    if waves is None and (lean := leanest(search, best)) is not best:
+        best, left = lean, leftover(fitter, lean)
     return Explained(best, search, left, waves)
 
 

@@ -25,16 +25,27 @@ def pruned(search: "Search", explanation: Explanation) -> Explanation:
             search.polish([names for names in smaller if search.tried[names].bic < limit + ROUGH])
         # What is clearly needed beside others is needed without them.
         doubtful = {smaller[names] for names in smaller if search.tried[names].bic < limit + ROUGH}
-        leanest = min((search.tried[names] for names in smaller), key=lambda e: e.bic)
-        if leanest.bic > limit and len(explanation.names) > SMALL and len(doubtful) > 1:
-            leanest = _without_two(search, explanation, sorted(doubtful))
-        if leanest.bic > limit:
+        best = min((search.tried[names] for names in smaller), key=lambda e: e.bic)
+        if best.bic > limit and len(explanation.names) > SMALL and len(doubtful) > 1:
+            best = _without_two(search, explanation, sorted(doubtful))
+        if best.bic > limit:
             break
-        doubtful &= leanest.names
-        explanation = leanest
+        doubtful &= best.names
+        explanation = best
     if explanation is not given:
         search.polish([explanation.names])
     return search.tried.get(explanation.names, explanation)
+
+
+def leanest(search: "Search", explanation: Explanation) -> Explanation:
+    """The set less what, all fits being at their end, does not pay after all."""
+    while explanation.names:
+        fewer = search.each_without(explanation, sorted(explanation.names))
+        best = min(fewer, key=lambda e: e.bic)
+        if best.bic > explanation.bic + margin(explanation):
+            break
+        explanation = best
+    return explanation
 
 
 def _without_two(search: "Search", explanation: Explanation, doubtful: list[str]) -> Explanation:

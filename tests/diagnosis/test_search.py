@@ -10,7 +10,7 @@ from hidden_dive import BASE, hidden_dive
 from host.catalogue import CATALOGUE, ORDINARY, structure_of
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import LONELY, RARITY, Fitter
-from host.diagnosis.pruning import pruned
+from host.diagnosis.pruning import leanest, pruned
 from host.diagnosis.search import Search
 from host.diagnosis.together import completed, together, with_ordinary
 from host.diagnosis.unknown_physics import with_unknown
@@ -111,3 +111,34 @@ def test_what_runs_away_joins_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         assert with_ordinary(search, fitter.base).names == {*ORDINARY, "plane_before"} - lost
         lost = {effect.name for effect in CATALOGUE}
         assert together(search, fitter.base) is None
+
+
+def test_a_member_that_does_not_pay_after_all_is_dropped_at_last() -> None:
+    true = {"c_wq": 0.8, "lag_time": 0.4}
+    names = frozenset({"heave_pitch_rate_coupling", "actuator_lag"})
+    fitter = Fitter([flown(true, names)])
+    idle = fitted(fitter, names | {"trim_moment"}, true | {"c_q0": 0.0})
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.trimmed())
+        search.remember(idle)
+        found = leanest(search, idle)
+        assert found.names == names
+        assert leanest(search, found).names == names
+
+
+def test_a_set_that_ended_below_its_part_was_never_fitted_beside_it() -> None:
+    true = {"c_wq": 0.8, "lag_time": 0.4, "c_ww": -0.8, "c_qw": 0.5}
+    names = frozenset({"heave_pitch_rate_coupling", "actuator_lag", "heave_quadratic_drag", "munk_moment"})
+    fitter = Fitter([flown(true, names)])
+    best = fitted(fitter, names, true)
+    poor = replace(best, names=frozenset({*ORDINARY}), fit=fitter.base.fit, bic=best.bic + 1000.0)
+    likelier = replace(best.fit, log_likelihood=best.fit.log_likelihood + 1.0)
+    for joint, is_tried_again in ((poor, True), (replace(poor, fit=likelier), False)):
+        said: list[str] = []
+        with Workers(fitter, 1) as workers:
+            search = Search(fitter, workers, said.append, fitter.base, fitter.trimmed())
+            search.remember(best)
+            search.remember(joint)
+            search.joint.add(joint.names)
+            assert completed(search, best).names == names
+        assert bool(said) == is_tried_again
