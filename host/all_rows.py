@@ -57,7 +57,7 @@ _OPERATIONS: dict[int, Callable[..., Any]] = {
 class AllRows:
     """An SX function of vectors, each (k, N) with a column a row or (k,) the same at all N rows.
 
-    NotImplementedError for an operation of CasADi that no equation here has used so far.
+    NotImplementedError for an operation of CasADi that is not in the table above.
     """
 
     def __init__(self, function: ca.Function) -> None:

@@ -82,7 +82,7 @@ def ascend(
             there = place(step.trial(damping).with_noise(noise), model)
             if there.likelihood > here.likelihood or damping > 1e6:
                 break
-            damping = max(damping * 10.0, 1e-6)
+            damping = max(damping * 10.0, 1e-3)
         gained = there.likelihood - here.likelihood
         converged = not gained > SETTLED
         if gained > 0.0:

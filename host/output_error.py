@@ -38,7 +38,7 @@ def output_error(
     runs = _free_runs(point, inputs)
     noise, cost = _likeliest_noise(_errors(runs, inputs), inputs)
     parts = _innovations(point, runs, inputs)
-    if not np.isfinite(cost) or runs_away(parts, inputs):
+    if not np.isfinite(cost) or diverges(parts, inputs):
         return run_away(point, inputs, free)
     while not converged and iterations < most_iterations:
         iterations += 1
@@ -79,13 +79,13 @@ def annealed(start: Point, inputs: list[Inputs], free: Mask, accelerations: tupl
         for _ in range(2):
             with np.errstate(all="ignore"):
                 white = whitened_innovations(point, inputs)
-                if runs_away(white, inputs, 1e3):
+                if diverges(white, inputs, 1e3):
                     return start
                 point = GaussNewton(white, point, free).trial(1e-6)
     return point.with_noise(start.noise)
 
 
-def runs_away(parts: list[tuple[Array, Array]], inputs: list[Inputs], scale: float = 1.0) -> bool:
+def diverges(parts: list[tuple[Array, Array]], inputs: list[Inputs], scale: float = 1.0) -> bool:
     """Whether a model leaves its recordings exponentially, by sensitivities (2, parameters + 4, N) of each.
 
     Without restoring, those of depth to a moment grow with the cube of time.

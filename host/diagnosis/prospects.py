@@ -14,7 +14,7 @@ from host.equations import Effect
 from host.filter_error import whitened_innovations
 from host.fit import Fit
 from host.gauss_newton import GaussNewton, Point
-from host.output_error import residuals_at, runs_away
+from host.output_error import diverges, residuals_at
 from host.propagate import Inputs
 from host.recording import Array
 from host.wave_forces import whitened_among_waves
@@ -89,7 +89,7 @@ def _whitened(
             white, deviance = residuals_at(point, inputs)
         if parent.fit.has_process_noise:
             deviance = sum(float(np.sum(e**2)) for e, _ in white)
-        return white, np.inf if runs_away(white, inputs) else deviance
+        return white, np.inf if diverges(white, inputs) else deviance
 
 
 def _probes(fitter: "Fitter", effect: Effect, parent: Explanation) -> list[Array]:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from host.equations import NAMES
 from host.identifiability import undetermined
 from host.maximum_likelihood import fit_maximum_likelihood
-from host.output_error import RUNAWAY, runs_away
+from host.output_error import RUNAWAY, diverges
 from host.propagate import free_run, inputs_of
 from host.sensitivities import innovations
 from host.uncertainty import covariance
@@ -34,11 +34,11 @@ def test_a_long_dive_of_a_vehicle_that_hardly_restores_itself_is_no_runaway() ->
     inputs = [inputs_of(recording)]
     _, sensitivity = innovations(np.array([*slow, 0.0, 0.0]), states[:, 0], inputs[0])
     assert np.abs(sensitivity).max() > RUNAWAY
-    assert not runs_away([(np.zeros(0), sensitivity)], inputs)
+    assert not diverges([(np.zeros(0), sensitivity)], inputs)
     diverging = np.array([*slow, 0.0, 0.0])
     diverging[2] = 1e-3
     _, sensitivity = innovations(diverging, states[:, 0], inputs[0])
-    assert runs_away([(np.zeros(0), sensitivity)], inputs)
+    assert diverges([(np.zeros(0), sensitivity)], inputs)
 
 
 def test_noisy_recording_is_unbiased_where_car_regression_fails() -> None:
