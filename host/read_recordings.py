@@ -42,18 +42,26 @@ def _aligned(
 ) -> list[Recording]:
     aligner = Aligner(vehicle.alignment)
     segments: dict[int, list[Sample]] = {}
+    boots: dict[int, int] = {}
     seen: Counter[str] = Counter()
     for measurement in reading.measurements:
         seen[measurement.quantity.value] += 1
         segment = aligner.segment  # a push that starts a new segment returns the end of the old one
         segments.setdefault(segment, []).extend(aligner.push(measurement))
+        boots[aligner.segment] = measurement.boot
     segments.setdefault(aligner.segment, []).extend(aligner.flush())
     digest, total = file_sha256(path), reading.counts + aligner.counts
     pieces = []
-    for samples in filter(None, segments.values()):
+    for segment, samples in segments.items():
+        if not samples:
+            continue
         whole = _recording(path.name, digest, samples, vehicle.alignment.step, total, tuple(reading.notes))
         longest = max(1.0, 2.5 * whole.step)
-        whole = replace(whole, rudder=_bridged(whole.rudder, round(longest / whole.step)))
+        whole = replace(
+            whole,
+            rudder=_bridged(whole.rudder, round(longest / whole.step)),
+            alarms=_alarms(reading, boots[segment], samples),
+        )
         pieces += split_at_gaps(whole, longest, needs)
     if not pieces:
         lacking = [name for name in needs if not seen[name]]
@@ -63,6 +71,14 @@ def _aligned(
             "check the vehicle file's channels (`--vehicle`)"
         )
     return pieces
+
+
+def _alarms(reading: LogReading | JournalReading, boot: int, samples: list[Sample]) -> tuple[float, ...]:
+    """When `mils run` found a mismatch in this stretch, s from its start."""
+    events = reading.events if isinstance(reading, JournalReading) else ()
+    marked = [e["t_us"] for e in events if e.get("event") == "mismatch" and e.get("boot") == boot]
+    first, last = samples[0].t_us, samples[-1].t_us
+    return tuple(1e-6 * (t_us - first) for t_us in marked if isinstance(t_us, int) and first <= t_us <= last)
 
 
 def _bridged(rudder: Array, longest: int) -> Array:

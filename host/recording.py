@@ -26,6 +26,7 @@ class Recording:
     has_angle   whether rudder is an angle in rad; False for another actuator in a unit of its own
     counts      what was refused in the whole file, by cause
     notes       what was lost or decided on the user's behalf, one sentence each
+    alarms      s, on the axis of time: when the vehicle was found to move no longer as it did
     """
 
     name: str
@@ -40,6 +41,7 @@ class Recording:
     has_angle: bool = True
     counts: Counter[str] = field(default_factory=Counter)
     notes: tuple[str, ...] = ()
+    alarms: tuple[float, ...] = ()
 
     @property
     def has_speed(self) -> bool:
@@ -66,6 +68,7 @@ class Recording:
             rudder=self.rudder[rows],
             speed=self.speed[rows],
             pitch_rate=self.pitch_rate[rows],
+            alarms=tuple(alarm for alarm in self.alarms if start <= alarm < end),
         )
 
 

@@ -7,6 +7,7 @@ import copyreg
 
 from host.catalogue import (
     actuator,
+    changes,
     environment,
     heave,
     kinematics,
@@ -28,7 +29,9 @@ CATALOGUE: tuple[Effect, ...] = (
     *sensor.EFFECTS,
     *environment.EFFECTS,
 )
-BY_NAME = {effect.name: effect for effect in CATALOGUE}
+CHANGES = changes.EFFECTS
+"""Entries that are tried only where something is known to have changed."""
+BY_NAME = {effect.name: effect for effect in (*CHANGES, *CATALOGUE)}  # what changes a speed, before its loss
 UNKNOWN = {effect.name: effect for effect in unknown.FORMS}
 _TOOLS = (nuisance.FREE_TRIM, nuisance.PLANE_BEFORE, unknown.ANY_SMOOTH_FORCE, *moments.SCANS.values())
 _ALL = BY_NAME | UNKNOWN | {effect.name: effect for effect in _TOOLS}

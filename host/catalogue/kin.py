@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
 from host.equations import Effect
 
@@ -28,6 +29,11 @@ def measure_alike(one: Effect, other: Effect) -> bool:
     if is_time(one) and is_time(other):
         return True
     return (one.slot, one.parameters[0].unit) == (other.slot, other.parameters[0].unit)
+
+
+def both_come(one: Effect, other: Effect) -> bool:
+    """Whether both are changes at one moment."""
+    return one.name in SCANS and other.name in SCANS
 
 
 def as_trim(known: dict[str, float], name: str) -> NDArray[np.float64]:

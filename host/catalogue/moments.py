@@ -7,6 +7,7 @@ them would gain most.
 
 import casadi as ca
 
+from host.catalogue import changes
 from host.catalogue.switching import after
 from host.equations import Chain, Effect, Parameter, Slot, Term
 
@@ -38,7 +39,14 @@ def _weaken(c: Chain) -> None:
     c.plane, c.change = c.plane * share, c.change * share
 
 
-def _at_any_moment(like: str, slot: Slot, unit: str, force: Term | None, plane: Term | None) -> Effect:
+def _at_any_moment(
+    like: str,
+    slot: Slot,
+    unit: str,
+    force: Term | None = None,
+    plane: Term | None = None,
+    sense: Term | None = None,
+) -> Effect:
     return Effect(
         name=f"{like}_at_any_moment",
         slot=slot,
@@ -53,13 +61,22 @@ def _at_any_moment(like: str, slot: Slot, unit: str, force: Term | None, plane: 
         probes=((*((0.0,) * COUNT), 0.0, 1.0),),
         force=force,
         plane=plane,
+        sense=sense,
     )
 
 
+def _of(kind: changes.Change) -> Effect:
+    def come(c: Chain) -> ca.SX:
+        return _changed(c, kind.name)
+
+    terms = (changes.with_size(action, come) for action in (kind.force, kind.plane, kind.sense))
+    return _at_any_moment(kind.name, kind.slot, kind.size.unit, *terms)
+
+
 SCANS: dict[str, Effect] = {
-    "ballast_change": _at_any_moment("ballast_change", "heave", "m/s^2", _weigh, None),
+    "ballast_change": _at_any_moment("ballast_change", "heave", "m/s^2", force=_weigh),
     "rudder_effectiveness_change": _at_any_moment(
-        "rudder_effectiveness_change", "actuator", "1", None, _weaken
+        "rudder_effectiveness_change", "actuator", "1", plane=_weaken
     ),
-}
+} | {kind.name: _of(kind) for kind in changes.KINDS}
 """By the name of the entry whose moment they tell."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from host.catalogue import BY_NAME, CATALOGUE, UNKNOWN, named
+from host.catalogue import BY_NAME, UNKNOWN, named
 from host.diagnosis.exchange import twins
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
@@ -214,7 +214,7 @@ def _slots(
 
 def _ranking(search: Search) -> list[tuple[str, float]]:
     """What each effect alone improves the information criterion by, best first."""
-    alone = [(effect.name, search.gain_alone(effect.name)) for effect in CATALOGUE]
+    alone = [(effect.name, search.gain_alone(effect.name)) for effect in search.fitter.candidates]
     return sorted((pair for pair in alone if pair[1] > -inf), key=lambda pair: -pair[1])
 
 

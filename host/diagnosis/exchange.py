@@ -3,8 +3,8 @@
 from math import log
 from typing import TYPE_CHECKING
 
-from host.catalogue import BY_NAME, CATALOGUE, ORDINARY, named
-from host.catalogue.kin import OFFSETS, PITCHING_INTO_DEPTH, measure_alike
+from host.catalogue import BY_NAME, ORDINARY, named
+from host.catalogue.kin import OFFSETS, PITCHING_INTO_DEPTH, both_come, measure_alike
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.margins import FEW, LARGEST_SET, NAMING_MARGIN, SMALL, TWIN_MARGIN, margin
 from host.diagnosis.pruning import pruned
@@ -27,13 +27,13 @@ def exchanged(search: "Search", best: Explanation) -> Explanation:
     is_small, is_large = len(best.names) <= SMALL, len(best.names) > LARGEST_SET
     for smaller in fewer:
         (member,) = best.names - smaller.names
-        kin = {e.name for e in CATALOGUE if _is_kin(search, e.name, member)}
+        kin = {e.name for e in search.fitter.candidates if _is_kin(search, e.name, member)}
         # In a large set a rare member may stand for a common one that joined too late.
         fair = kin if named(member).is_common else kin | {*ORDINARY}
         gains = search.gains(smaller, is_small, fair if is_large else None)
         rivals = _likely(gains, smaller.bic - best.bic, RIVALS if is_small else FEW)
         kin &= gains.keys()
-        rivals |= kin if is_small else {name for name in kin if measure_alike(named(name), named(member))}
+        rivals |= kin if is_small else {name for name in kin if _is_close_kin(name, member)}
         for name in sorted(rivals - best.names):
             beside = best if name in kin else None
             fits = ("grown", (smaller, name, search.values(name), beside))
@@ -81,11 +81,16 @@ def _is_kin(search: "Search", name: str, member: str) -> bool:
     """Whether prediction may misjudge its gain: they measure alike, or share an end of it and pay."""
     if name == member:
         return False
-    if measure_alike(named(name), named(member)) or {name, member} <= {*PITCHING_INTO_DEPTH}:
+    if _is_close_kin(name, member) or {name, member} <= {*PITCHING_INTO_DEPTH}:
         return True
     pays = search.gain_alone(name) > NAMING_MARGIN
     slots = {named(name).slot, named(member).slot}
     return pays and (len(slots) == 1 or slots == {"actuator", "sensor"})
+
+
+def _is_close_kin(name: str, member: str) -> bool:
+    one, other = named(name), named(member)
+    return measure_alike(one, other) or both_come(one, other)
 
 
 def twins(search: "Search", best: Explanation, name: str) -> list[str]:

@@ -5,7 +5,7 @@ from math import log
 
 import numpy as np
 
-from host.catalogue import named, structure_of
+from host.catalogue import CATALOGUE, CHANGES, named, structure_of
 from host.catalogue.kin import OFFSETS, as_trim
 from host.catalogue.moments import FIRST, LAST
 from host.catalogue.nuisance import FREE_TRIM
@@ -15,7 +15,7 @@ from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations
 from host.diagnosis.prospects import form_gains, gain
 from host.diagnosis.starts import guess, has_usual_heave, idle, is_far, starts_of, with_usual_heave
-from host.equations import NAMES
+from host.equations import NAMES, Effect
 from host.filter_error import filter_error, filter_error_from
 from host.fit import Fit
 from host.gauss_newton import Mask, Point
@@ -37,6 +37,7 @@ from host.wave_forces import wave_forces, wave_forces_from
 
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
 RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exact twins
+ALARM_LATE, ALARM_EARLY = 120.0, 30.0  # s, by which an alarm may come after a change, or be put before it
 LONELY = 8.0  # of BIC, against what seldom acts without another effect that is not there: odds of 50 to 1
 COMPRESSED = "depth_dependent_buoyancy"
 # Enough to rank sets; those that count are polished.
@@ -54,6 +55,7 @@ class Fitter:
     known    an explanation of other stretches of the same vehicle; without one the base model is fitted
     steps    (2,) of rounding, where it rules pitch and depth
     thinned  the recordings for what takes errors for normal
+    candidates  entries of the catalogue that are tried: what changes at one moment after an alarm only
     """
 
     def __init__(self, recordings: list[Recording], known: Explanation | None = None) -> None:
@@ -67,10 +69,17 @@ class Fitter:
         if recordings[0].has_speed:
             self.held["u0"] = float(np.mean([r.speed.mean() for r in recordings]))
             # Where the speed is measured its loss is data, and there is nothing in it to estimate.
-            self.held |= {name: 0.0 for name in ("c_ud", "c_uq")} | {"speed_time": 1.0}
+            self.held |= {name: 0.0 for name in ("c_ud", "c_uq", "speed_step")} | {"speed_time": 1.0}
+            self.held["speed_change_time"] = 0.0
         self.held |= dict.fromkeys(SPANS.values(), max(float(r.time[-1]) for r in recordings))
         self.held[FIRST] = min(float(r.time[0]) for r in recordings)
         self.held[LAST] = max(float(r.time[-1]) for r in recordings)
+        self.candidates: tuple[Effect, ...] = CATALOGUE
+        alarms = [alarm for recording in recordings for alarm in recording.alarms]
+        if alarms:
+            self.candidates += CHANGES
+            self.held[FIRST] = max(self.held[FIRST], min(alarms) - ALARM_LATE)
+            self.held[LAST] = min(self.held[LAST], max(alarms) + ALARM_EARLY)
         self._longest_substep = LONGEST_SUBSTEP
         self._inputs: dict[tuple[Names, bool], list[Inputs]] = {}
         self.base = self._base() if known is None else known

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from math import inf
 
-from host.catalogue import CATALOGUE, named
+from host.catalogue import named
 from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE, has_memory
 from host.diagnosis.exchange import exchanged
@@ -107,7 +107,7 @@ class Search:
         self, parent: Explanation, is_thorough: bool = True, among: set[str] | None = None
     ) -> dict[str, float]:
         """Twice the log-likelihood each effect could gain on top of the parent, predicted."""
-        others = [name for name in _candidates(parent) if among is None or name in among]
+        others = [name for name in self._candidates(parent) if among is None or name in among]
         found = self.workers.results(
             [("gain", (parent, name, self.values(name), is_thorough)) for name in others]
         )
@@ -180,7 +180,7 @@ class Search:
         against its own coefficients, would gain once all of them are free; so until little is left these
         are always tried.
         """
-        others = _candidates(parent)
+        others = self._candidates(parent)
         if size == 1 and not self.root.fit.has_process_noise:
             return others
         gains = self.gains(parent, is_leading)
@@ -241,14 +241,13 @@ class Search:
             for names, smaller in self.tried.items()
         )
 
+    def _candidates(self, parent: Explanation) -> list[str]:
+        """What may join a set: the offsets only once the free trim, which does their work, has gone.
 
-def _candidates(parent: Explanation) -> list[str]:
-    """What may join a set: the offsets only once the free trim, which does their work, has gone.
-
-    And where the plane was before, once it matters.
-    """
-    barred = OFFSETS if FREE_TRIM.name in parent.names else ()
-    candidates = [e.name for e in CATALOGUE if e.name not in parent.names and e.name not in barred]
-    if PLANE_BEFORE.name not in parent.names and any(has_memory(named(name)) for name in parent.names):
-        candidates.append(PLANE_BEFORE.name)
-    return candidates
+        And where the plane was before, once it matters.
+        """
+        barred = {*parent.names, *(OFFSETS if FREE_TRIM.name in parent.names else ())}
+        candidates = [effect.name for effect in self.fitter.candidates if effect.name not in barred]
+        if PLANE_BEFORE.name not in parent.names and any(has_memory(named(name)) for name in parent.names):
+            candidates.append(PLANE_BEFORE.name)
+        return candidates

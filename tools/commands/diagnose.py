@@ -27,6 +27,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SIM.csv",
         help="a simulator's output on the same rudder: say what physics it lacks, and what it has too much",
     )
+    part = parser.add_mutually_exclusive_group()
+    part.add_argument(
+        "--around",
+        type=float,
+        metavar="SECONDS",
+        help="what changed at about this time of the recording (default: at the first alarm of a journal)",
+    )
+    part.add_argument("--whole", action="store_true", help="all of a journal, whatever alarms it holds")
     parser.add_argument("--vehicle", type=Path, help="vehicle file: columns, units, channels, speed")
     parser.add_argument(
         "--out",
@@ -51,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
 
     model = read_model(args.model) if args.model is not None else None
     with progress(args.quiet) as say:
-        recordings = read_all(args.recordings, vehicle, say)
+        recordings = _part(read_all(args.recordings, vehicle, say), args)
         from host.diagnosis.answer import Answer
         from host.diagnosis.diagnose import diagnose
         from host.diagnosis.files import write_diagnosis, write_extended_model
@@ -92,3 +100,14 @@ def run(args: argparse.Namespace) -> int:
     print(f"  {found.remaining}")
     print(f"report: {args.out / 'report.html'}")
     return 0 if found.verdict in ("no_mismatch", "explained") else 1
+
+
+def _part(recordings: list[Recording], args: argparse.Namespace) -> list[Recording]:
+    """What of the recordings is looked at: all of it, or the part around a change."""
+    from host.diagnosis.around import around, around_alarm
+
+    if args.around is not None:
+        return around(recordings, args.around)
+    if args.whole:
+        return [replace(recording, alarms=()) for recording in recordings]
+    return around_alarm(recordings)

@@ -1,0 +1,130 @@
+"""What changes at one moment, beside ballast and the plane's effect: tried where something is known to have.
+
+A recording that shows no such moment would mostly let them imitate what acts all the time.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import casadi as ca
+
+from host.catalogue.switching import after
+from host.equations import Chain, Effect, Parameter, Slot, Term
+
+Action = Callable[[Chain, ca.SX], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """One quantity of the chain that takes another value at one moment.
+
+    force, plane, sense  as of an Effect, with the change that has come so far
+    """
+
+    name: str
+    slot: Slot
+    size: Parameter
+    sentence: str
+    equation: str
+    force: Action | None = None
+    plane: Action | None = None
+    sense: Action | None = None
+
+    @property
+    def time(self) -> str:
+        """The name of the moment among the parameters."""
+        return f"{self.name}_time"
+
+    def effect(self) -> Effect:
+        """The entry for the catalogue."""
+        size, time = self.size.name, self.time
+        moment = Parameter(name=time, unit="s", lower=0, upper=1e6, meaning="when it happened")
+
+        def come(c: Chain) -> ca.SX:
+            return c.p[size] * after(c.time, c.p[time])
+
+        return Effect(
+            name=self.name,
+            slot=self.slot,
+            parameters=(self.size, moment),
+            sentence=self.sentence,
+            equation=f"{self.equation} (t > {time})",
+            manoeuvre="the same manoeuvre before and after",
+            probes=((0.0, 0.5),),
+            scales=("", "duration"),
+            force=with_size(self.force, come),
+            plane=with_size(self.plane, come),
+            sense=with_size(self.sense, come),
+        )
+
+
+def with_size(action: Action | None, size: Callable[[Chain], ca.SX]) -> Term | None:
+    """The action as an effect's term, for what gives the size."""
+    return None if action is None else lambda c: action(c, size(c))
+
+
+def _speed(c: Chain, size: ca.SX) -> None:
+    unmeasured = size * (1 - c.is_speed_known)
+    c.speed = c.speed + c.p["u0"] * unmeasured
+    c.speed_ratio = 1 + unmeasured
+
+
+def _trim(c: Chain, size: ca.SX) -> None:
+    c.pitch += size
+
+
+def _plane_zero(c: Chain, size: ca.SX) -> None:
+    c.plane = c.plane + size
+
+
+def _pitch_datum(c: Chain, size: ca.SX) -> None:
+    c.sensed_pitch = c.sensed_pitch + size
+
+
+def _current(c: Chain, size: ca.SX) -> None:
+    c.climb += size
+
+
+KINDS = (
+    Change(
+        name="speed_change",
+        slot="surge",
+        force=_speed,
+        size=Parameter(name="speed_step", unit="1", lower=-0.9, upper=5, meaning="share lost or gained"),
+        sentence="The forward speed changed at one moment: thrust was lost, or something drags.",
+        equation="u0 -> u0 (1 + speed_step)",
+    ),
+    Change(
+        name="trim_moment_change",
+        slot="pitch",
+        force=_trim,
+        size=Parameter(name="c_qb", unit="rad/s^2", lower=-20, upper=20, meaning="step of the moment"),
+        sentence="A constant moment came at one moment: a weight shifted, or part of the hull is bent.",
+        equation="q' = ... + c_qb",
+    ),
+    Change(
+        name="rudder_offset_change",
+        slot="actuator",
+        plane=_plane_zero,
+        size=Parameter(name="rudder_step", unit="rad", lower=-0.5, upper=0.5, meaning="step of the zero"),
+        sentence="The plane's zero moved at one moment: its drive slipped, or it is bent.",
+        equation="delta = servo + rudder_step",
+    ),
+    Change(
+        name="pitch_bias_change",
+        slot="sensor",
+        sense=_pitch_datum,
+        size=Parameter(name="pitch_step", unit="rad", lower=-0.5, upper=0.5, meaning="step of the datum"),
+        sentence="The pitch sensor's datum moved at one moment: it was set anew, or knocked.",
+        equation="recorded pitch = theta + pitch_step",
+    ),
+    Change(
+        name="current_change",
+        slot="environment",
+        force=_current,
+        size=Parameter(name="current_step", unit="m/s", lower=-3, upper=3, meaning="step of the current"),
+        sentence="The vehicle entered or left water that moves up or down.",
+        equation="zeta' = ... + current_step",
+    ),
+)
+EFFECTS = tuple(kind.effect() for kind in KINDS)
