@@ -40,6 +40,26 @@ def test_a_restart_of_the_vehicle_cuts_in_two(tmp_path: Path) -> None:
     assert {piece.notes for piece in pieces} == {()}
 
 
+def test_alarms_belong_to_the_boot_and_the_stretch_in_which_they_came(tmp_path: Path) -> None:
+    path = tmp_path / "dive.jsonl"
+    writer = Journal(path, vehicle="v", configuration={}, wall_s=lambda: 1.7e9, warn=print)
+    for boot in range(2):
+        for k in range(100):
+            t_us = 5_000_000 + 100_000 * k
+            writer.measurements(
+                Measurement(quantity=quantity, value=0.01 * k, t_us=t_us, source="x", boot=boot)
+                for quantity in (Quantity.DEPTH, Quantity.PITCH, Quantity.RUDDER)
+            )
+            if boot == 1 and k == 70:
+                writer.event("mismatch", "changed", {"t_us": t_us})
+                writer.event("mismatch", "of another clock", {"t_us": 50_000_000})
+                writer.event("link", "came back", {})
+    writer.close()
+    first, second = read_recordings(path, default_vehicle())
+    assert first.alarms == ()
+    assert second.alarms == pytest.approx((7.0,))
+
+
 def test_a_plane_that_turned_unheard_is_on_its_way(tmp_path: Path) -> None:
     path = journal(tmp_path)
     lines = path.read_text().splitlines(keepends=True)

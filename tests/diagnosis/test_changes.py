@@ -1,0 +1,91 @@
+"""What changed at a moment that is known roughly: the part around it, and the name and size of the change."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hidden_dive import BASE, Extra, hidden_dive
+
+from host.catalogue import CATALOGUE, CHANGES
+from host.diagnosis.around import around, around_alarm
+from host.diagnosis.diagnose import diagnose
+from host.diagnosis.fitter import ALARM_LATE, Fitter
+from host.errors import RecordingError
+from host.recording import Array
+
+WHEN, TOLD = 47.0, 66.0  # s
+
+
+def trim(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+    return 0.0, 0.05 * (time > WHEN), 0.0
+
+
+def slower(time: float, x: Array, plane: float) -> tuple[float, float, float]:
+    lost = -0.1 * (time > WHEN)
+    weaker = (1.0 + lost) ** 2 - 1.0
+    heave = BASE["a1"] * lost * x[0] + BASE["b1"] * weaker * plane
+    pitch = BASE["a2"] * lost * x[1] + BASE["b2"] * weaker * plane
+    return heave, pitch, -BASE["u0"] * lost * x[2]
+
+
+@pytest.mark.parametrize(
+    ("extra", "name", "parameter", "size"),
+    [
+        (trim, "trim_moment_change", "c_qb", 0.05),
+        (slower, "speed_change", "speed_step", -0.1),
+    ],
+    ids=["trim", "slower"],
+)
+def test_what_changed_is_named_with_its_size_and_its_moment(
+    extra: Extra, name: str, parameter: str, size: float
+) -> None:
+    found = diagnose([replace(hidden_dive(extra, seed=4, duration=120.0), alarms=(TOLD,))])
+    assert found.verdict == "explained"
+    (effect,) = found.effects
+    assert name == effect.name or name in effect.twins
+    if name == effect.name:
+        value, std, _ = effect.coefficients[parameter]
+        assert abs(value - size) < 4.0 * std
+        moment, std, _ = effect.coefficients[f"{name}_time"]
+        assert abs(moment - WHEN) < max(4.0 * std, 0.2)
+
+
+def test_nothing_is_said_to_have_changed_after_a_false_alarm() -> None:
+    found = diagnose([replace(hidden_dive(seed=4, duration=120.0), alarms=(TOLD,))])
+    assert found.verdict == "no_mismatch"
+
+
+def test_only_an_alarm_has_changes_tried_and_only_near_it() -> None:
+    dive = hidden_dive()
+    assert Fitter([dive]).candidates == CATALOGUE
+    alarmed = Fitter([replace(dive, time=dive.time + 1000.0, alarms=(1000.0 + TOLD,))])
+    assert alarmed.candidates == (*CATALOGUE, *CHANGES)
+    assert alarmed.held["moments_first"] == pytest.approx(max(1000.0, 1000.0 + TOLD - ALARM_LATE))
+    assert alarmed.held["moments_last"] == pytest.approx(dive.time[-1] + 1000.0)
+
+
+def test_the_part_around_an_alarm_is_looked_at_and_told() -> None:
+    dive = hidden_dive(duration=30.0)
+    long = replace(
+        dive,
+        time=np.arange(12000) * 0.1,
+        **{
+            name: np.tile(getattr(dive, name), 40)
+            for name in ("depth", "pitch", "rudder", "speed", "pitch_rate")
+        },
+    )
+    assert around_alarm([long]) == [long]
+    (part,) = around_alarm([replace(long, alarms=(700.0, 900.0))])
+    assert part.alarms == (700.0,)
+    assert part.time[0] == pytest.approx(400.0)
+    assert part.time[-1] == pytest.approx(999.9)
+    assert "700 s, 900 s" in part.notes[-1]
+    (quick,) = around([replace(long, step=0.02)], 700.0)
+    assert quick.time[0] == pytest.approx(550.0)
+
+
+def test_a_moment_outside_the_recording_is_an_error() -> None:
+    with pytest.raises(RecordingError, match=r"--around 5000: no stretch holds .* \(hidden.csv 0 to 30 s\)"):
+        around([hidden_dive(duration=30.0)], 5000.0)
+    with pytest.raises(RecordingError, match="and 30 s before it"):
+        around([hidden_dive(duration=30.0)], 5.0)
