@@ -14,6 +14,7 @@ from host.diagnosis.absence import one_step_without
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations
 from host.diagnosis.prospects import form_gains, gain
+from host.diagnosis.spans import ALARM_LATE
 from host.diagnosis.starts import guess, has_usual_heave, idle, is_far, starts_of, with_usual_heave
 from host.equations import NAMES, Effect
 from host.filter_error import filter_error, filter_error_from
@@ -37,7 +38,7 @@ from host.wave_forces import wave_forces, wave_forces_from
 
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
 RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exact twins
-ALARM_LATE, ALARM_EARLY = 120.0, 30.0  # s, by which an alarm may come after a change, or be put before it
+ALARM_EARLY = 30.0  # s, by which a moment that somebody names may lie before the change
 LONELY = 8.0  # of BIC, against what seldom acts without another effect that is not there: odds of 50 to 1
 COMPRESSED = "depth_dependent_buoyancy"
 # Enough to rank sets; those that count are polished.

@@ -10,6 +10,7 @@ from host.recording import Recording
 SHORTEST_DIVIDED = 48.0  # s; a shorter recording judges as a whole or not at all
 SHORTEST_SPAN = 8.0  # s; a free run over less says little
 JUDGING_SHARE = 0.1  # of a recording, in each of two spans
+ALARM_LATE = 90.0  # s, by which an alarm may come after what it tells of
 LONGEST_RUN = 600.0  # s; a teaching run starts anew after so long, or the smallest drift would rule it
 LONG = 15000  # rows of all teaching runs, beyond which a search begins with an excerpt
 EXCERPT = 4000  # rows
@@ -46,14 +47,11 @@ def divide(recordings: list[Recording]) -> Spans:
     unseen: list[Recording] = []
     for recording in recordings:
         kept = recording
-        if recording.duration >= SHORTEST_DIVIDED:
-            length = max(SHORTEST_SPAN, JUDGING_SHARE * recording.duration)
-            for centre in (0.3, 0.75):  # teaching data on both sides, wherever something changed
-                start = recording.time[0] + centre * recording.duration - 0.5 * length
-                piece = recording.between(start, start + length)
-                if _is_measured(piece):
-                    judging.append(piece)
-                    kept = _blanked(kept, start, start + length)
+        for start, end in _set_aside(recording):
+            piece = recording.between(start, end)
+            if _is_measured(piece):
+                judging.append(piece)
+                kept = _blanked(kept, start, end)
         for run, whole in zip(_runs(kept), _runs(recording), strict=True):
             if _is_measured(run):
                 teaching.append(run)
@@ -73,6 +71,24 @@ def excerpt(teaching: list[Recording]) -> list[Recording]:
         parts = [run.between(float(start), float(end)) for start, end in pairwise(edges)]
         pieces.append(max(parts, key=lambda part: float(np.std(part.rudder)) * _is_measured(part)))
     return pieces
+
+
+def _set_aside(recording: Recording) -> list[tuple[float, float]]:
+    """Where a recording judges, s: teaching data on both sides of each, and of an alarm's change as well."""
+    begins, ends = float(recording.time[0]), float(recording.time[-1])
+    length = max(SHORTEST_SPAN, JUDGING_SHARE * recording.duration)
+    if recording.duration < SHORTEST_DIVIDED:
+        return []
+    if not recording.alarms:
+        centres = [begins + share * recording.duration for share in (0.3, 0.75)]
+        return [(centre - 0.5 * length, centre + 0.5 * length) for centre in centres]
+    sides = [(begins, recording.alarms[0] - ALARM_LATE), (recording.alarms[0], ends)]
+    lengths = [min(length, (end - start) / 3.0) for start, end in sides]
+    return [
+        (0.5 * (start + end - share), 0.5 * (start + end + share))
+        for (start, end), share in zip(sides, lengths, strict=True)
+        if share >= SHORTEST_SPAN
+    ]
 
 
 def _is_measured(recording: Recording) -> bool:

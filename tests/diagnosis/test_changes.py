@@ -9,7 +9,8 @@ from hidden_dive import BASE, Extra, hidden_dive
 from host.catalogue import CATALOGUE, CHANGES
 from host.diagnosis.around import around, around_alarm
 from host.diagnosis.diagnose import diagnose
-from host.diagnosis.fitter import ALARM_LATE, Fitter
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.spans import divide
 from host.errors import RecordingError
 from host.recording import Array
 
@@ -60,7 +61,7 @@ def test_only_an_alarm_has_changes_tried_and_only_near_it() -> None:
     assert Fitter([dive]).candidates == CATALOGUE
     alarmed = Fitter([replace(dive, time=dive.time + 1000.0, alarms=(1000.0 + TOLD,))])
     assert alarmed.candidates == (*CATALOGUE, *CHANGES)
-    assert alarmed.held["moments_first"] == pytest.approx(max(1000.0, 1000.0 + TOLD - ALARM_LATE))
+    assert alarmed.held["moments_first"] == pytest.approx(1000.0)
     assert alarmed.held["moments_last"] == pytest.approx(dive.time[-1] + 1000.0)
 
 
@@ -82,6 +83,17 @@ def test_the_part_around_an_alarm_is_looked_at_and_told() -> None:
     assert "700 s, 900 s" in part.notes[-1]
     (quick,) = around([replace(long, step=0.02)], 700.0)
     assert quick.time[0] == pytest.approx(550.0)
+
+
+def test_what_judges_lies_on_both_sides_of_a_change() -> None:
+    dive = hidden_dive(duration=300.0)
+    spans = divide([replace(dive, alarms=(200.0,))]).judging
+    assert [(span.time[0], span.time[-1]) for span in spans] == [
+        pytest.approx((40.0, 69.9), abs=0.2),
+        pytest.approx((235.0, 264.9), abs=0.2),
+    ]
+    (span,) = divide([replace(dive, alarms=(290.0,))]).judging
+    assert span.time[-1] < 200.0
 
 
 def test_a_moment_outside_the_recording_is_an_error() -> None:

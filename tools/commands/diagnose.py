@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"  {effect.name}{twins}")
         for name, (value, std, unit) in effect.coefficients.items():
             if std > 0.0:  # else it was measured, not estimated
-                print(f"    {name:20s} {value:+.5g} +- {std:.2g} {unit}")
+                print(f"    {name:24s} {value:+.5g} +- {std:.2g} {unit}")
         for separation in answer.separating(effect.name):
             print(f"    {separation.sentence}")
     print(f"  {found.remaining}")
