@@ -50,8 +50,8 @@ def remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit
         return sea.strip()
     if verdict == "explained" and after.chi2 > WORSE:
         return (
-            "Where it was learnt, what is left is as small as the sensors' own noise; on the stretches that "
-            f"were held out {worst} is off by {size:.1f} times it: a coefficient is not known well enough yet."
+            "Where it was learnt, what is left is as small as the sensors' own noise; on stretches that were "
+            f"held out {worst} is off by {size:.1f} times it: a coefficient is not known well enough yet."
         )
     if verdict == "explained":
         return "What is left is as small as the sensors' own noise."

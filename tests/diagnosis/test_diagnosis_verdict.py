@@ -61,3 +61,9 @@ def test_many_effects_that_few_vehicles_have_are_doubted_by_name(base: Explanati
     assert "may imitate physics that the catalogue does not hold" in said
     off = remaining("partly_explained", crowd, leftover(), misfit(4.0))
     assert "what was learnt does not hold on the stretches that were held out" in off
+
+
+def test_what_explains_all_but_the_stretches_that_were_held_out_says_so(base: Explanation) -> None:
+    one = named(base, RARE[0])
+    assert remaining("explained", one, leftover(), misfit(1.2)).endswith("sensors' own noise.")
+    assert "held out pitch is off by 3.0 times it" in remaining("explained", one, leftover(), misfit(9.0))
