@@ -3,12 +3,14 @@
 Simulated dives in rough sea (and in calm water) go sample by sample through the live estimator and the alarm.
 At a set time the dive is copied, and each copy suffers one fault, of the size that doubles the prediction
 error: over the 30 s after it, that of pitch or depth is twice what it would have been and twice its usual.
+With `--diagnose` each dive with an alarm goes on for five minutes and is diagnosed as its journal would be.
 """
 
 import argparse
 import copy
 import sys
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +20,7 @@ from firmware_model.estimator import make_estimator
 from firmware_model.sample import Sample
 from host.mismatch import Mismatch, MismatchConfig, MismatchWatch
 from host.prediction_window import Array, PredictionWindow, Reference
+from host.recording import Recording
 from tools.sitl.effects import Timed
 from tools.sitl.excitation import Excitation
 from tools.sitl.plant import Plant, stream
@@ -30,6 +33,7 @@ VOYAGE = 3.0  # h, after which another dive begins in the null run
 ONSET = 2400.0  # s, of a fault
 ALLOWED = 30.0  # s, from the fault to the alarm
 HORIZON = 10.0  # s, of the free runs by which a fault is sized
+AROUND = 300.0  # s before and after an alarm, that are diagnosed
 LEVELS = np.array([0.00175, 0.01])  # rad, m
 
 
@@ -155,12 +159,28 @@ def size_of(
     return high
 
 
-def strike(name: str, seed: int) -> Iterator[tuple[str, float | None, float | None, Mismatch | None]]:
-    """Fault, size, delay in s and alarm, of each fault in one sea."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Strike:
+    """One fault: its size, None where none doubles the error; the delay of the alarm, s; what it told.
+
+    recording  the dive around the alarm, if that is wanted
+    """
+
+    title: str
+    size: float | None = None
+    delay: float | None = None
+    alarm: Mismatch | None = None
+    recording: Recording | None = None
+
+
+def strike(name: str, seed: int, records: bool = False) -> Iterator[Strike]:
+    """Each fault in one sea."""
+    past: deque[Sample] = deque(maxlen=round(AROUND / STEP))
     dive, crew, window = Dive(scenario_of(name), seed), Crew(), PredictionWindow(round(HORIZON / STEP), STEP)
     found = []
     for k in range(round(ONSET / STEP)):
         sample = dive.sample()
+        past.append(sample)
         crew.take(sample)
         window.push(sample)
         reference = crew.watch.reference
@@ -173,15 +193,47 @@ def strike(name: str, seed: int) -> Iterator[tuple[str, float | None, float | No
     for title, fault in FAULTS.items():
         size = size_of(fault, dive, window, reference, usual)
         if size is None:
-            yield title, None, None, None
+            yield Strike(title=title)
             continue
         struck, watching = copy.deepcopy(dive), copy.deepcopy(crew)
         fault.happens(struck.plant, size)
-        alarm = None
+        alarm, samples = None, list(past)
         begun = struck.plant.now.t_s
         while alarm is None and struck.plant.now.t_s < begun + 2.0 * ALLOWED:
-            alarm = watching.take(struck.sample())
-        yield title, size, None if alarm is None else struck.plant.now.t_s - begun, alarm
+            samples.append(struck.sample())
+            alarm = watching.take(samples[-1])
+        if alarm is None:
+            yield Strike(title=title, size=size)
+            continue
+        delay, recording = struck.plant.now.t_s - begun, None
+        if records:
+            samples += [struck.sample() for _ in range(round(AROUND / STEP))]
+            recording = recorded(samples, alarm.t_us)
+        yield Strike(title=title, size=size, delay=delay, alarm=alarm, recording=recording)
+
+
+def recorded(samples: Iterable[Sample], alarm_us: int) -> Recording:
+    """The samples as a journal with an alarm is read, on the clock of the vehicle."""
+    table = np.array([[s.t_us * 1e-6, s.depth, s.pitch, s.rudder] for s in samples]).T
+    nan = np.full(table.shape[1], np.nan)
+    return Recording(
+        name="alarm", sha256="", time=table[0], depth=table[1], pitch=table[2], rudder=table[3], speed=nan,
+        pitch_rate=nan, step=STEP, alarms=(alarm_us * 1e-6,),
+    )  # fmt: skip
+
+
+def diagnosed(recording: Recording) -> str:
+    """What `mils diagnose` says of it: the verdict, the effects, and in brackets what could be instead."""
+    from host.diagnosis.around import around_alarm
+    from host.diagnosis.diagnose import diagnose
+
+    found = diagnose(around_alarm([recording]), jobs=2)
+    said = []
+    for effect in found.effects:
+        value, std, unit = next(iter(effect.coefficients.values()), (np.nan, np.nan, ""))
+        twins = f" (or {', '.join(effect.twins)})" if effect.twins else ""
+        said.append(f"{effect.name} {value:+.3g} +- {std:.2g} {unit}{twins}")
+    return "; ".join([found.verdict, *said])
 
 
 def false_alarms(hours: float, seed: int) -> Iterator[tuple[float, Mismatch]]:
@@ -204,6 +256,7 @@ def main() -> int:
     parser.add_argument("--hours", type=float, default=24.0, help="of rough sea without a fault (default 24)")
     parser.add_argument("--seas", type=int, default=10, help="dives with faults, each water (default 10)")
     parser.add_argument("--seed", type=int, default=1, help="of the first dive (default 1)")
+    parser.add_argument("--diagnose", action="store_true", help="what the bench makes of each alarm, as well")
     args = parser.parse_args()
     for name in ("calm", "rough"):
         print(f"{name}: fault, size that doubles the prediction error, delay, slot named", flush=True)
@@ -211,7 +264,8 @@ def main() -> int:
         named: dict[str, int] = dict.fromkeys(FAULTS, 0)
         invisible = 0
         for seed in range(args.seed, args.seed + args.seas):
-            for title, size, delay, alarm in strike(name, seed):
+            for struck in strike(name, seed, args.diagnose):
+                title, size, delay, alarm = struck.title, struck.size, struck.delay, struck.alarm
                 if size is None:
                     invisible += 1
                     continue
@@ -224,6 +278,8 @@ def main() -> int:
                     else f"{delay:4.1f} s  {' or '.join((alarm.slot, *alarm.others))}, {alarm.change}"
                 )
                 print(f"    {seed:3d}  {title:18s} {size:7.3f} {fault.unit:15s} {said}", flush=True)
+                if struck.recording is not None:
+                    print(f"         {diagnosed(struck.recording)}", flush=True)
         for title, delays in told.items():
             if delays:
                 in_time = sum(delay <= ALLOWED for delay in delays)

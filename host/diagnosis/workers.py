@@ -1,8 +1,11 @@
 """Fits side by side on several cores: each worker keeps the recordings and its own functions."""
 
 import multiprocessing
+import os
+import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
+from multiprocessing.connection import wait
 from types import TracebackType
 from typing import Any
 
@@ -52,7 +55,16 @@ class Workers:
 
 def _open(*arguments: Any) -> None:
     global _fitter
+    threading.Thread(target=_leave_with_parent, daemon=True).start()
     _fitter = Fitter(*arguments)
+
+
+def _leave_with_parent() -> None:
+    """A worker whose parent was killed would wait for work for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
 
 
 def _call(method: str, arguments: tuple[Any, ...]) -> Any:
