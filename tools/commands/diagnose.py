@@ -52,6 +52,12 @@ def run(args: argparse.Namespace) -> int:
     if args.jobs is not None and args.jobs < 1:
         print("mils: --jobs must be at least 1", file=sys.stderr)
         return 2
+    if args.around is not None and args.simulation is not None:
+        print(
+            "mils: --around cannot be used with --simulation; cut both files to the same part",
+            file=sys.stderr,
+        )
+        return 2
     jobs = args.jobs if args.jobs is not None else min(8, len(os.sched_getaffinity(0)))
     vehicle = load_vehicle(args.vehicle)
     require_bench()
@@ -108,6 +114,6 @@ def _part(recordings: list[Recording], args: argparse.Namespace) -> list[Recordi
 
     if args.around is not None:
         return around(recordings, args.around)
-    if args.whole:
+    if args.whole or args.simulation is not None:
         return [replace(recording, alarms=()) for recording in recordings]
     return around_alarm(recordings)
