@@ -27,7 +27,7 @@ def base_name(answer: Answer) -> str:
 
 
 def runs_picture(answer: Answer) -> str:
-    """Recording against base and extended model, and what each leaves; judging spans are shaded."""
+    """Recording against base and extended model, and what each leaves; judging spans are shaded, alarms dashed."""
     found = answer.found
     recording = _longest(found)
     measured = np.vstack([recording.pitch, recording.depth])
@@ -68,6 +68,9 @@ def runs_picture(answer: Answer) -> str:
         for span in divide([recording]).judging:
             for axis in axes:
                 axis.axvspan(span.time[0], span.time[-1], color=JUDGING, zorder=-1)
+    for alarm in recording.alarms:
+        for axis in axes:
+            axis.axvline(alarm, color="#444444", linestyle="--", linewidth=1.0, label="alarm")
     axes[0].invert_yaxis()
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False, ncols=4, markerscale=3)
     plane_trace(axes[4], recording)

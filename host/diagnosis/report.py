@@ -7,6 +7,7 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, select_autoescape
 
 from host.catalogue import BY_NAME
+from host.catalogue.moments import SCANS
 from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import Diagnosis, NamedEffect
 from host.diagnosis.pictures import (
@@ -82,7 +83,7 @@ def summary(answer: Answer) -> str:
         return "The given model lacks no physics, but what it holds is not what the recording shows."
     if not found.effects and not unknown_in(found.extended):
         return "Simulation and recording differ, and none of the physics in the catalogue explains it."
-    names = [title(effect.name) for effect in found.effects] or ["a force of which only the form is known"]
+    names = [_dated(effect) for effect in found.effects] or ["a force of which only the form is known"]
     listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
     before, after = found.base_misfit, found.extended_misfit
     gain = (
@@ -97,7 +98,18 @@ def summary(answer: Answer) -> str:
         if found.effects
         else f"None of the physics in the catalogue explains it, but {listed} comes near.",
     }[found.verdict]
-    return f"{lead} With it, {gain} {where}."
+    is_alarmed = any(recording.alarms for recording in found.recordings)
+    has_changed = any(effect.name in SCANS for effect in found.effects)
+    unchanged = " Near the alarm nothing was found to have changed." * (is_alarmed and not has_changed)
+    return f"{lead} With it, {gain} {where}.{unchanged}"
+
+
+def _dated(effect: NamedEffect) -> str:
+    """Its title, and the moment of what came at one."""
+    if effect.name not in SCANS or not effect.coefficients:
+        return title(effect.name)
+    moment, _, unit = list(effect.coefficients.values())[-1]
+    return f"{title(effect.name)} (at {moment:.0f} {unit})"
 
 
 def next_steps(answer: Answer) -> list[str]:

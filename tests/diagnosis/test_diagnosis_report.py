@@ -7,7 +7,7 @@ import pytest
 
 from host.diagnosis.answer import Against, Answer
 from host.diagnosis.comparison import compare, side_of
-from host.diagnosis.diagnose import Diagnosis
+from host.diagnosis.diagnose import Diagnosis, NamedEffect
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.report import write_report
 from host.diagnosis.separation import separations
@@ -36,6 +36,18 @@ def test_nothing_missing_shows_no_shares(coupled: Diagnosis, tmp_path: Path) -> 
     assert "No mismatch" in shown
     assert "What was left out" not in shown
     assert shown.count("data:image/png;base64,") == 3
+
+
+def test_after_an_alarm_it_is_said_what_changed_and_when_or_that_nothing_did(
+    coupled: Diagnosis, tmp_path: Path
+) -> None:
+    alarmed = replace(coupled, recordings=[replace(r, alarms=(60.0,)) for r in coupled.recordings])
+    assert "Near the alarm nothing was found to have changed" in page(Answer(found=alarmed), tmp_path)
+    coefficients = {"current_step": (0.03, 0.001, "m/s"), "current_change_time": (47.2, 0.1, "s")}
+    change = NamedEffect(name="current_change", delta_bic=99.0, coefficients=coefficients)
+    shown = page(Answer(found=replace(alarmed, effects=[change])), tmp_path)
+    assert "current change (at 47 s)" in shown
+    assert "nothing was found to have changed" not in shown
 
 
 @pytest.mark.parametrize("kind", ["model", "simulation"])
