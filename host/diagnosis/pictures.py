@@ -27,7 +27,7 @@ def base_name(answer: Answer) -> str:
 
 
 def runs_picture(answer: Answer) -> str:
-    """Recording against base and extended model, and what each leaves; judging spans are shaded, alarms dashed."""
+    """Recording against base and extended model, and what each leaves; shaded what judges, dashed alarms."""
     found = answer.found
     recording = _longest(found)
     measured = np.vstack([recording.pitch, recording.depth])
