@@ -11,17 +11,21 @@ LEAST_BEFORE = 30.0  # s; with less nobody knows what was usual
 
 
 def around_alarm(recordings: list[Recording]) -> list[Recording]:
-    """The part around the first alarm that a journal holds, with a note; all recordings where none does."""
+    """The part around the first alarm that a journal holds, with a note; all recordings where none does.
+
+    An alarm right after the start of a stretch has nothing before it to compare with, and is passed over.
+    """
     for recording in recordings:
-        if recording.alarms:
-            told = ", ".join(f"{alarm:.0f} s" for alarm in recording.alarms)
+        alarms = [alarm for alarm in recording.alarms if _is_inside(recording, alarm)]
+        if alarms:
+            told = ", ".join(f"{alarm:.0f} s" for alarm in alarms)
             note = (
-                f"`mils run` gave an alarm at {told}: this is what changed at the first; --around SECONDS "
-                "looks at another moment, --whole at everything as if nothing had changed"
+                f"`mils run` gave an alarm at {told}: only the part around the first is looked at, for what "
+                "changed there; --around SECONDS asks about another moment, --whole about everything"
             )
-            (part,) = around([recording], recording.alarms[0])
+            (part,) = around([recording], alarms[0])
             return [replace(part, notes=(*part.notes, note))]
-    return recordings
+    return [replace(recording, alarms=()) for recording in recordings]
 
 
 def around(recordings: list[Recording], moment: float) -> list[Recording]:
@@ -29,14 +33,16 @@ def around(recordings: list[Recording], moment: float) -> list[Recording]:
 
     RecordingError where no stretch holds the moment and what came before it.
     """
-    side = LONGEST_SIDE
     for recording in recordings:
-        begins, ends = float(recording.time[0]), float(recording.time[-1])
-        if begins + LEAST_BEFORE <= moment <= ends:
-            side = min(side, 0.5 * LONG * recording.step)
+        if _is_inside(recording, moment):
+            side = min(LONGEST_SIDE, 0.5 * LONG * recording.step)
             part = replace(recording, alarms=(moment,))
             return [part.between(moment - side, moment + side)]
     stretches = ", ".join(f"{r.name} {r.time[0]:.0f} to {r.time[-1]:.0f} s" for r in recordings)
     raise RecordingError(
         f"--around {moment:g}: no stretch holds that moment and {LEAST_BEFORE:g} s before it ({stretches})"
     )
+
+
+def _is_inside(recording: Recording, moment: float) -> bool:
+    return bool(recording.time[0] + LEAST_BEFORE <= moment <= recording.time[-1])

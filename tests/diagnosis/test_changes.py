@@ -81,6 +81,9 @@ def test_the_part_around_an_alarm_is_looked_at_and_told() -> None:
     assert part.time[0] == pytest.approx(400.0)
     assert part.time[-1] == pytest.approx(999.9)
     assert "700 s, 900 s" in part.notes[-1]
+    (whole,) = around_alarm([replace(long, alarms=(12.0,))])
+    assert whole.time.size == long.time.size
+    assert whole.alarms == ()
     (quick,) = around([replace(long, step=0.02)], 700.0)
     assert quick.time[0] == pytest.approx(550.0)
 
