@@ -15,6 +15,7 @@ from host.diagnosis.leftover import Leftover, leftover
 from host.diagnosis.locate import Location, locate
 from host.diagnosis.pruning import leanest
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
+from host.diagnosis.sea_fits import with_sea
 from host.diagnosis.search import Search
 from host.diagnosis.seas import WAVES, Waves, among_waves, in_a_sea
 from host.diagnosis.spans import Spans, divide, excerpt
@@ -191,7 +192,7 @@ def _refitted(explanation: Explanation, recordings: list[Recording]) -> Explanat
     """The set fitted to all stretches, teaching and judging, for the model that is handed back."""
     fitter = Fitter(recordings, known=explanation)
     again = fitter.across(fitter.refitted(explanation))
-    return fitter.with_sea(again) if explanation.fit.has_process_noise else again
+    return with_sea(fitter, again) if explanation.fit.has_process_noise else again
 
 
 def _slots(

@@ -1,7 +1,6 @@
 """Fits of sets of effects, jointly with the base, to the recordings of one vehicle."""
 
 from dataclasses import replace
-from math import log
 
 import numpy as np
 
@@ -11,13 +10,14 @@ from host.catalogue.moments import FIRST, LAST
 from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import SPANS
 from host.diagnosis.absence import one_step_without
+from host.diagnosis.charges import charged_bic
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations
 from host.diagnosis.prospects import form_gains, gain
 from host.diagnosis.spans import ALARM_LATE
 from host.diagnosis.starts import guess, has_usual_heave, idle, is_far, starts_of, with_usual_heave
 from host.equations import NAMES, Effect
-from host.filter_error import filter_error, filter_error_from
+from host.filter_error import filter_error_from
 from host.fit import Fit
 from host.gauss_newton import Mask, Point
 from host.maximum_likelihood import fit_maximum_likelihood
@@ -28,18 +28,15 @@ from host.recording import Array, Recording
 from host.rounding import thinned
 from host.valleys import (
     SHARING_POLES,
-    log_prior,
     look_alikes,
     other_valleys,
     plausibility,
     with_rivals,
 )
-from host.wave_forces import wave_forces, wave_forces_from
+from host.wave_forces import wave_forces_from
 
 HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
-RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exact twins
 ALARM_EARLY = 30.0  # s, by which a moment that somebody names may lie before the change
-LONELY = 8.0  # of BIC, against what seldom acts without another effect that is not there: odds of 50 to 1
 COMPRESSED = "depth_dependent_buoyancy"
 # Enough to rank sets; those that count are polished.
 FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 25, 0.2
@@ -97,7 +94,7 @@ class Fitter:
     def _base(self) -> Explanation:
         held = {name: value for name, value in self.held.items() if name in NAMES}
         fit = fit_maximum_likelihood(self.recordings, held=held, noise_model="output_error")
-        return self._explained(frozenset(), fit)
+        return self.explained(frozenset(), fit)
 
     def trimmed(self) -> Explanation:
         """The base with a free constant force and moment, from which the search for all else sets out."""
@@ -112,8 +109,8 @@ class Fitter:
             Point(structure, np.concatenate([values, offsets]), fit.initial, fit.noise),
             Point(structure, np.concatenate([base.parameters, np.zeros(2)]), base.initial, base.noise),
         ]
-        best = max(map(self._carried_on, starts), key=plausibility)
-        return self._explained(names, best)
+        best = max(map(self.carried_on, starts), key=plausibility)
+        return self.explained(names, best)
 
     def retrimmed(self, explanation: Explanation, offsets: Names) -> Explanation:
         """The same set with some of the catalogue's offsets in place of those it has, or of the free trim.
@@ -135,46 +132,7 @@ class Fitter:
         structure = structure_of(names)
         parameters = np.array([known[name] for name in structure.names])
         start = Point(structure, parameters, fit.initial, fit.levels)
-        return self._explained(names, self._fit([start], hopeless(fit)))
-
-    def with_sea(self, explanation: Explanation) -> Explanation:
-        """The same set when random forces act as well; whatever grows from it is fitted with them, too."""
-        fit = filter_error(explanation.fit, self.inputs(explanation.names, for_filter=True))
-        return self._explained(explanation.names, fit)
-
-    def as_filtered(self, explanation: Explanation) -> Explanation:
-        """The same set with the errors of rounded readings taken for normal, as a filter does.
-
-        Only then its likelihood compares with that of a set among random forces.
-        """
-        fit = explanation.fit
-        if fit.has_process_noise or not self.steps.any():
-            return explanation
-        start = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
-        inputs = self.inputs(explanation.names, for_filter=True)
-        return self._explained(explanation.names, output_error(start, inputs, fit.free))
-
-    def with_waves(self, explanation: Explanation, waves: Fit | None = None) -> Explanation:
-        """The same set among waves: the likeliest ones, or those of another fit, held.
-
-        Whatever grows from it is fitted in these waves.
-        """
-        free, fit = self.free(explanation.names), explanation.fit
-        inputs = self.inputs(explanation.names, for_filter=True)
-        if waves is None and not fit.waves.any():
-            return self._explained(explanation.names, wave_forces(fit, inputs))
-        start = Point(fit.structure, fit.parameters, fit.initial, (fit if waves is None else waves).levels)
-        climbed = wave_forces_from(start, inputs, free, holds_noise=waves is not None)
-        return self._explained(explanation.names, climbed)
-
-    def with_regular_waves(self, explanation: Explanation, white: Fit) -> Explanation:
-        """A set found among waves with the regular wave nearest to them, and the white forces of a fit."""
-        fit = explanation.fit
-        start = Point(fit.structure, fit.parameters, fit.initial, white.levels)
-        plain = self._explained(explanation.names, self._carried_on(start))
-        if "surface_waves" in plain.names:
-            return plain
-        return self.grown(plain, "surface_waves", [np.array([0.01, 0.01, 2.0 * np.pi / fit.waves[0]])])
+        return self.explained(names, self._fit([start], hopeless(fit)))
 
     def excess(self, fit: Fit) -> float:
         """Sensor noise of a fit over the noise floor, in the worse channel: 1 where nothing is left."""
@@ -195,7 +153,7 @@ class Fitter:
         starts = starts_of(self, parent, name, values, rival)
         fit = self._fit(starts)
         if parent.fit.has_process_noise:
-            return self._explained(parent.names | {name}, fit)
+            return self.explained(parent.names | {name}, fit)
         end = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
         again = look_alikes(end) if named(name).parameters[0].name in SHARING_POLES else []
         if not has_usual_heave(end):
@@ -204,7 +162,7 @@ class Fitter:
         fit = max([fit, *others], key=plausibility)
         if named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
             fit = self._fit([idle(starts[0], name)])
-        return self._explained(parent.names | {name}, fit)
+        return self.explained(parent.names | {name}, fit)
 
     def gain(self, parent: Explanation, name: str, values: list[Array], is_thorough: bool) -> float:
         """See host.diagnosis.prospects, as for `form_gains`: here for the workers to call."""
@@ -225,17 +183,17 @@ class Fitter:
         starts = [start]
         if is_far(self, parent):
             starts.append(guess(self, start, names))
-        return self._explained(names, self._fit(starts))
+        return self.explained(names, self._fit(starts))
 
     def reduced(self, explanation: Explanation, names: Names) -> Explanation:
         """The set with these members only."""
-        return self._explained(names, self._carried_on(self.point(names, explanation)))
+        return self.explained(names, self.carried_on(self.point(names, explanation)))
 
     def polished(self, explanation: Explanation, tolerance: float = SETTLED) -> Explanation:
         """The same set, its fit carried on until next to nothing more is gained."""
         fit = explanation.fit
         start = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
-        return self._explained(explanation.names, self._carried_on(start, tolerance))
+        return self.explained(explanation.names, self.carried_on(start, tolerance))
 
     def across(self, explanation: Explanation) -> Explanation:
         """The same set in the likeliest valley of all, with the others that this recording cannot rule out.
@@ -246,7 +204,7 @@ class Fitter:
         if fit.has_process_noise:
             return explanation
         ends = other_valleys(fit, self.inputs(explanation.names))
-        return self._explained(explanation.names, with_rivals(fit, ends))
+        return self.explained(explanation.names, with_rivals(fit, ends))
 
     def refitted(self, explanation: Explanation) -> Explanation:
         """A set fitted to other stretches, fitted to these."""
@@ -264,7 +222,7 @@ class Fitter:
             inputs = self.inputs(explanation.names, for_filter=True)
             moved = annealed(start, inputs, fit.free, self.accelerations)
             fit = self._fit([start, moved])
-        return self.polished(self._explained(explanation.names, fit), EXACT)
+        return self.polished(self.explained(explanation.names, fit), EXACT)
 
     def free(self, names: Names) -> Mask:
         """Which parameters of a set are estimated."""
@@ -278,25 +236,9 @@ class Fitter:
         return int(self.free(names).sum() - self.free(frozenset()).sum())
 
     def bic(self, fit: Fit, names: Names) -> float:
-        """Bayesian information criterion of a fit; lower is better.
-
-        Charged as well: a speed that is hardly likely, what not every vehicle has, or not by itself, and the
-        choice among all the periods that an oscillation could have had.
-        """
-        rare = sum(not named(name).is_common for name in names)
-        unlikely = -2.0 * log_prior(fit)
-        chosen = sum(2.0 * log(self._periods_within(named(name).periods)) for name in names)
-        lonely = sum(not {named(name).beside} <= names | {None} for name in names)
-        charged = RARITY * rare + LONELY * lonely + unlikely + chosen
-        return fit.bic + self.free_parameters(names) * log(fit.samples) + charged
-
-    def _periods_within(self, limits: tuple[float, float] | None) -> float:
-        """How many oscillations within these limits, s, the longest recording tells apart; at least 1."""
-        if limits is None:
-            return 1.0
+        """Of a fit with the charges of its effects; see host.diagnosis.charges."""
         longest = max(self.recordings, key=lambda recording: recording.duration)
-        shortest = max(limits[0], 2.0 * longest.step)
-        return max(1.0, longest.duration * (1.0 / shortest - 1.0 / limits[1]))
+        return charged_bic(fit, names, self.free_parameters(names), longest)
 
     def inputs(self, names: Names, for_filter: bool = False) -> list[Inputs]:
         """What drives the set's equations over each recording.
@@ -311,7 +253,7 @@ class Fitter:
             ]
         return self._inputs[names, for_filter]
 
-    def _explained(self, names: Names, fit: Fit) -> Explanation:
+    def explained(self, names: Names, fit: Fit) -> Explanation:
         return Explanation(names, fit, self.bic(fit, names))
 
     def point(
@@ -332,7 +274,7 @@ class Fitter:
         names = frozenset(effect.name for effect in structure.effects)
         inputs, free = self.inputs(names), self.free(names)
         if starts[0].noise[2:].any():
-            return self._carried_on(starts[0])
+            return self.carried_on(starts[0])
         fits = [output_error(start, inputs, free, first, TOLERANCE) for start in starts]
         best = max(fits, key=lambda fit: fit.log_likelihood)
         if best.log_likelihood < least:
@@ -340,7 +282,7 @@ class Fitter:
         on = Point(structure, best.parameters, best.initial, best.noise)
         return output_error(on, inputs, free, MOST_ITERATIONS, TOLERANCE)
 
-    def _carried_on(self, start: Point, tolerance: float = SETTLED) -> Fit:
+    def carried_on(self, start: Point, tolerance: float = SETTLED) -> Fit:
         names = frozenset(effect.name for effect in start.structure.effects)
         free, has_forces = self.free(names), bool(start.noise[2:].any())
         inputs = self.inputs(names, for_filter=has_forces)

@@ -9,6 +9,7 @@ from host.catalogue.environment import WAVE_PERIODS
 from host.catalogue.unknown import SWINGING_MOMENT
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.margins import NAMING_MARGIN
+from host.diagnosis.sea_fits import as_filtered, with_regular_waves, with_sea, with_waves
 from host.diagnosis.search import Search
 
 WAVES = "surface_waves"
@@ -35,11 +36,11 @@ def in_a_sea(calm: Search, best: Explanation) -> tuple[Search, Explanation]:
     """
     fitter = calm.fitter
     calm.on_progress("random forces")
-    root, also = fitter.with_sea(calm.root), fitter.with_sea(best)
-    least = fitter.as_filtered(best).bic
+    root, also = with_sea(fitter, calm.root), with_sea(fitter, best)
+    least = as_filtered(fitter, best).bic
     if min(root.bic, also.bic) > least - NAMING_MARGIN:
         return calm, best
-    rough = Search(fitter, calm.workers, calm.on_progress, fitter.with_sea(calm.base), root, calm.part)
+    rough = Search(fitter, calm.workers, calm.on_progress, with_sea(fitter, calm.base), root, calm.part)
     found = rough.run([also])
     return (rough, found) if found.bic < least else (calm, best)
 
@@ -63,17 +64,17 @@ def among_waves(
     plain = best
     for name in sorted(swing):
         plain = rough.without(plain, name)
-    white = plain if plain.fit.has_process_noise else fitter.with_sea(plain)
+    white = plain if plain.fit.has_process_noise else with_sea(fitter, plain)
     named = calm.names & BY_NAME.keys() - {WAVES}
-    beside = [fitter.with_sea(fitter.reduced(calm, named))] if named - white.names else []
-    first = min((fitter.with_waves(one) for one in (white, *beside)), key=lambda e: e.bic)
+    beside = [with_sea(fitter, fitter.reduced(calm, named))] if named - white.names else []
+    first = min((with_waves(fitter, one) for one in (white, *beside)), key=lambda e: e.bic)
     period = 2.0 * np.pi / first.fit.waves[0]
-    least = fitter.as_filtered(best).bic
+    least = as_filtered(fitter, best).bic
     if first.bic > least - NAMING_MARGIN or not WAVE_PERIODS[0] < period < WAVE_PERIODS[1]:
         return rough, best, None
-    base, root = (fitter.with_waves(one, first.fit) for one in (rough.base, rough.root))
+    base, root = (with_waves(fitter, one, first.fit) for one in (rough.base, rough.root))
     search = Search(fitter, rough.workers, rough.on_progress, base, root, rough.part)
     found = search.run([first])
-    fitted = first if found.names == first.names else fitter.with_waves(found)
-    model = fitter.with_regular_waves(fitted, white.fit)
+    fitted = first if found.names == first.names else with_waves(fitter, found)
+    model = with_regular_waves(fitter, fitted, white.fit)
     return search, found, Waves(delta_bic=least - first.bic, fitted=fitted, model=model)

@@ -8,8 +8,9 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import CATALOGUE, ORDINARY, structure_of
+from host.diagnosis.charges import LONELY, RARITY
 from host.diagnosis.explanation import Explanation, Names
-from host.diagnosis.fitter import LONELY, RARITY, Fitter
+from host.diagnosis.fitter import Fitter
 from host.diagnosis.pruning import leanest, pruned
 from host.diagnosis.search import Search
 from host.diagnosis.together import completed, together, with_ordinary

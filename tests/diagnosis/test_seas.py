@@ -6,6 +6,7 @@ from hidden_dive import Extra, hidden_dive
 
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.sea_fits import with_sea
 from host.diagnosis.search import Search
 from host.diagnosis.seas import among_waves
 from host.diagnosis.workers import Workers
@@ -41,7 +42,7 @@ def test_waves_are_estimated_beside_what_was_found_without_them(monkeypatch: pyt
     damped = in_waves(lambda time, x, plane: (0.0, -6.0 * x[1] * abs(x[1]), 0.0), 0.01, 0.06)  # noqa: ARG005
     fitter = Fitter([hidden_dive(damped, duration=90.0)])
     calm = fitter.grown(fitter.base, "pitch_quadratic_damping", [])
-    base, root = fitter.with_sea(fitter.base), fitter.with_sea(fitter.trimmed())
+    base, root = with_sea(fitter, fitter.base), with_sea(fitter, fitter.trimmed())
     monkeypatch.setattr(Search, "run", lambda _, also: min(also, key=lambda e: e.bic))
     with Workers(fitter, 1) as workers:
         for known, names in ((fitter.base, set()), (calm, {"pitch_quadratic_damping"})):
