@@ -180,7 +180,8 @@ def _summary(end: Progress) -> str:
         f"refused: {refused or 'none'}",
     ]
     if end.alarms:
-        lines.append(f"mismatch: {end.alarms} alarms, the journal says when and where")
+        alarms = f"{end.alarms} alarm{'s' * (end.alarms > 1)}"
+        lines.append(f"mismatch: {alarms}; `mils diagnose` of the journal says what changed")
     if end.lost_lines:
         lines.append(f"not recorded: {end.lost_lines} lines could not be written")
     for name in end.estimate.values:
