@@ -145,7 +145,7 @@ SWINGING_MOMENT = Effect(
     sentence="A moment acts that swings with a period of its own, and does not move the water.",
     equation="q' = ... + swing_sine sin(2 pi t/T) + swing_cosine cos(2 pi t/T), T = swing_period",
     manoeuvre="a straight level run of several periods with the planes fixed",
-    probes=((1e-3, 1e-3, 10.0),),
+    probes=((0.0, 0.0, 10.0),),
     sizes=("swing_sine", "swing_cosine"),
     periods=SWING_PERIODS,
     force=_swinging_moment,

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 LINES_TRIED = 3
 MOMENTS_TRIED = 3
+SLIGHT = 1e-9  # damping of a step that is as good as full
 
 
 def gain(fitter: "Fitter", parent: Explanation, name: str, values: list[Array], is_thorough: bool) -> float:
@@ -63,16 +64,27 @@ def form_gains(fitter: "Fitter", parent: Explanation) -> dict[str, float]:
 def probed(
     fitter: "Fitter", parent: Explanation, effect: Effect, values: list[Array], is_thorough: bool = True
 ) -> list[tuple[float, Array]]:
-    """Predicted gain and start values of an effect, for each of its probes."""
+    """Predicted gain and start values of an effect, for each of its probes.
+
+    An oscillation is linear in its sizes: it sets out from none, and starts with those that suit its period.
+    """
     names = parent.names | {effect.name}
     inputs, free = fitter.inputs(names, parent.fit.has_process_noise), fitter.free(names)
     before = parent.fit.deviance
     found = []
     for probe in [*values, *(_probes(fitter, effect, parent) if is_thorough else [])]:
         point = fitter.point(names, parent, effect.name, probe)
+        own = np.array(point.structure.names)
         white, cost = _whitened(point, inputs, parent)
-        left = GaussNewton(white, point, free).predicted_cost(cost) if np.isfinite(cost) else np.inf
-        found.append((before - left, probe))
+        if not np.isfinite(cost):
+            found.append((-np.inf, probe))
+            continue
+        has_no_size = effect.periods is not None and not probe[:-1].any()
+        step = GaussNewton(white, point, free & (own != effect.parameters[-1].name) if has_no_size else free)
+        found.append((before - step.predicted_cost(cost), probe))
+        if has_no_size:
+            reached = dict(zip(own, step.trial(SLIGHT).parameters, strict=True))
+            found[-1] = found[-1][0], np.array([reached[each.name] for each in effect.parameters])
     return found
 
 
