@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hidden_dive import BASE, hidden_dive
 
-from host.catalogue import structure_of
+from host.catalogue import named, structure_of
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.prospects import probed
 from host.diagnosis.starts import with_usual_heave
 from host.gauss_newton import Point
 from host.output_error import output_error
@@ -170,3 +171,18 @@ def test_a_base_without_a_usual_heave_is_no_place_to_begin(
     found = fitter.polished(fitter.grown(parent, "heave_pitch_rate_coupling", []))
     assert found.fit.parameters[0] == pytest.approx(BASE["a1"], abs=0.1)
     assert found.fit.parameters[-1] == pytest.approx(0.8, abs=0.1)
+
+
+def test_an_oscillation_starts_with_the_size_that_suits_its_period() -> None:
+    # Within the steps of the depth what is too large by far tells nothing of what is right.
+    def swell(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+        return 0.0, 0.0, 4e-4 * np.sin(2.0 * np.pi * time / 140.0)
+
+    dive = hidden_dive(swell, seed=2, duration=200.0, noise=0.1)
+    fitter = Fitter([replace(dive, depth=0.02 * np.round(dive.depth / 0.02))])
+    assert fitter.steps[1] > 0.0
+    found = probed(fitter, fitter.base, named("internal_wave"), [])
+    assert min(gain for gain, _ in found) > -1.0
+    _, (sine, cosine, period) = max(found, key=lambda pair: pair[0])
+    assert period == pytest.approx(140.0, rel=0.1)
+    assert np.hypot(sine, cosine) == pytest.approx(4e-4, rel=0.3)

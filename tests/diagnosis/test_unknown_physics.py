@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hidden_dive import hidden_dive
 
 from host.catalogue import BY_NAME, UNKNOWN, named, structure_of
 from host.catalogue.unknown import FORMS
@@ -15,7 +16,6 @@ from host.equations import Effect
 from host.model import read_model
 from host.predict import predict
 from host.vehicle import vehicle_from_table
-from tests.diagnosis.hidden_dive import hidden_dive
 
 
 @pytest.mark.long
