@@ -66,7 +66,7 @@ def with_size(action: Action | None, size: Callable[[Chain], ca.SX]) -> Term | N
 def _speed(c: Chain, size: ca.SX) -> None:
     unmeasured = size * (1 - c.is_speed_known)
     c.speed = c.speed + c.p["u0"] * unmeasured
-    c.speed_ratio = 1 + unmeasured
+    c.speed_ratio = c.speed_ratio + unmeasured
 
 
 def _trim(c: Chain, size: ca.SX) -> None:

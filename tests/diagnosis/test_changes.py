@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from hidden_dive import BASE, Extra, hidden_dive
 
-from host.catalogue import CATALOGUE, CHANGES
+from host.catalogue import CATALOGUE, CHANGES, structure_of
+from host.catalogue.moments import LAST
 from host.diagnosis.around import around, around_alarm
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.spans import divide
 from host.errors import RecordingError
+from host.propagate import free_run, inputs_of
 from host.recording import Array
 
 WHEN, TOLD = 47.0, 66.0  # s
@@ -104,3 +106,15 @@ def test_a_moment_outside_the_recording_is_an_error() -> None:
         around([hidden_dive(duration=30.0)], 5000.0)
     with pytest.raises(RecordingError, match="and 30 s before it"):
         around([hidden_dive(duration=30.0)], 5.0)
+
+
+@pytest.mark.parametrize("change", ["speed_change", "speed_change_at_any_moment"])
+def test_a_change_of_no_size_leaves_the_speed_that_is_lost_as_it_is(change: str) -> None:
+    dive = hidden_dive(duration=30.0)
+    runs = []
+    for names in (("speed_loss",), ("speed_loss", change)):
+        structure = structure_of(names)
+        known = {**BASE, "speed_time": 5.0, "c_ud": 2.0, "c_uq": 1.0, "speed_change_time": 10.0, LAST: 30.0}
+        parameters = np.array([known.get(name, 0.0) for name in structure.names])
+        runs.append(free_run(parameters, np.array([0.0, 0.0, 0.0, 20.0]), inputs_of(dive, structure)).outputs)
+    np.testing.assert_array_equal(*runs)
