@@ -117,8 +117,8 @@ class JournalReading:
 
     header     "vehicle", "version", "started", "configuration" as `host.toml_config.build` takes it
     estimates  as published: "t_us" and "estimate"
-    events     "event", "detail" and "wall_s"; a "mismatch" also "t_us", "slot", "change", "ratio" ...; with
-               the "boot" of the vehicle that they belong to, once something was measured
+    events     "event", "detail" and "wall_s"; a "mismatch" also "t_us", "slot", "change", "ratio" ... and
+               "boot", that of the vehicle it belongs to
     counts     lines by kind; "damaged" lines could not be read
     notes      sentences for people about what was lost
     """
@@ -150,8 +150,8 @@ def read_journal(path: Path) -> JournalReading:
                     else:
                         measurements.append(measurement)
                 elif kind in others:
-                    if measurements:
-                        record.setdefault("boot", measurements[-1].boot)
+                    if record.get("event") == "mismatch" and measurements:
+                        record.setdefault("boot", measurements[-1].boot)  # its t_us is on that boot's clock
                     others[kind].append(record)
                 counts[kind] += 1
     except OSError as error:
