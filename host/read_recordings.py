@@ -76,7 +76,7 @@ def _aligned(
 def _alarms(reading: LogReading | JournalReading, boot: int, samples: list[Sample]) -> tuple[float, ...]:
     """When `mils run` found a mismatch in this stretch, s from its start."""
     events = reading.events if isinstance(reading, JournalReading) else ()
-    marked = [e["t_us"] for e in events if e.get("event") == "mismatch" and e.get("boot") == boot]
+    marked = [e.get("t_us") for e in events if e.get("event") == "mismatch" and e.get("boot") == boot]
     first, last = samples[0].t_us, samples[-1].t_us
     return tuple(1e-6 * (t_us - first) for t_us in marked if isinstance(t_us, int) and first <= t_us <= last)
 

@@ -18,6 +18,7 @@ import numpy as np
 from firmware_model.config import EstimatorConfig
 from firmware_model.estimator import make_estimator
 from firmware_model.sample import Sample
+from host.diagnosis.around import LONGEST_SIDE, around_alarm
 from host.mismatch import Mismatch, MismatchConfig, MismatchWatch
 from host.prediction_window import Array, PredictionWindow, Reference
 from host.recording import Recording
@@ -33,7 +34,6 @@ VOYAGE = 3.0  # h, after which another dive begins in the null run
 ONSET = 2400.0  # s, of a fault
 ALLOWED = 30.0  # s, from the fault to the alarm
 HORIZON = 10.0  # s, of the free runs by which a fault is sized
-AROUND = 300.0  # s before and after an alarm, that are diagnosed
 LEVELS = np.array([0.00175, 0.01])  # rad, m
 
 
@@ -175,7 +175,7 @@ class Strike:
 
 def strike(name: str, seed: int, records: bool = False) -> Iterator[Strike]:
     """Each fault in one sea."""
-    past: deque[Sample] = deque(maxlen=round(AROUND / STEP))
+    past: deque[Sample] = deque(maxlen=round(LONGEST_SIDE / STEP))
     dive, crew, window = Dive(scenario_of(name), seed), Crew(), PredictionWindow(round(HORIZON / STEP), STEP)
     found = []
     for k in range(round(ONSET / STEP)):
@@ -207,7 +207,7 @@ def strike(name: str, seed: int, records: bool = False) -> Iterator[Strike]:
             continue
         delay, recording = struck.plant.now.t_s - begun, None
         if records:
-            samples += [struck.sample() for _ in range(round(AROUND / STEP))]
+            samples += [struck.sample() for _ in range(round(LONGEST_SIDE / STEP))]
             recording = recorded(samples, alarm.t_us)
         yield Strike(title=title, size=size, delay=delay, alarm=alarm, recording=recording)
 
@@ -224,7 +224,6 @@ def recorded(samples: Iterable[Sample], alarm_us: int) -> Recording:
 
 def diagnosed(recording: Recording) -> str:
     """What `mils diagnose` says of it: the verdict, the effects, and in brackets what could be instead."""
-    from host.diagnosis.around import around_alarm
     from host.diagnosis.diagnose import diagnose
 
     found = diagnose(around_alarm([recording]), jobs=2)

@@ -23,25 +23,29 @@ def around_alarm(recordings: list[Recording]) -> list[Recording]:
                 f"`mils run` gave an alarm at {told}: only the part around the first is looked at, for what "
                 "changed there; --around SECONDS asks about another moment, --whole about everything"
             )
-            (part,) = around([recording], alarms[0])
-            return [replace(part, notes=(*part.notes, note))]
+            return [_cut(recording, alarms[0], note)]
     return [replace(recording, alarms=()) for recording in recordings]
 
 
 def around(recordings: list[Recording], moment: float) -> list[Recording]:
-    """The rows within five minutes (fewer at high rates) of a moment, s, marked as an alarm.
+    """The rows of a recording within five minutes (fewer at high rates) of a moment, s, marked as an alarm.
 
-    RecordingError where no stretch holds the moment and what came before it.
+    Of several recordings the first that holds it. RecordingError where none holds the moment and what came
+    before it.
     """
     for recording in recordings:
         if _is_inside(recording, moment):
-            side = min(LONGEST_SIDE, 0.5 * LONG * recording.step)
-            part = replace(recording, alarms=(moment,))
-            return [part.between(moment - side, moment + side)]
+            return [_cut(recording, moment, f"only the part around {moment:g} s is looked at")]
     stretches = ", ".join(f"{r.name} {r.time[0]:.0f} to {r.time[-1]:.0f} s" for r in recordings)
     raise RecordingError(
         f"--around {moment:g}: no stretch holds that moment and {LEAST_BEFORE:g} s before it ({stretches})"
     )
+
+
+def _cut(recording: Recording, moment: float, note: str) -> Recording:
+    side = min(LONGEST_SIDE, 0.5 * LONG * recording.step)
+    part = replace(recording, alarms=(moment,), notes=(*recording.notes, note))
+    return part.between(moment - side, moment + side)
 
 
 def _is_inside(recording: Recording, moment: float) -> bool:

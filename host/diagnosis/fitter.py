@@ -254,6 +254,7 @@ class Fitter:
         return self._inputs[names, for_filter]
 
     def explained(self, names: Names, fit: Fit) -> Explanation:
+        """The fit of a set, with what the set is charged."""
         return Explanation(names, fit, self.bic(fit, names))
 
     def point(
@@ -283,6 +284,7 @@ class Fitter:
         return output_error(on, inputs, free, MOST_ITERATIONS, TOLERANCE)
 
     def carried_on(self, start: Point, tolerance: float = SETTLED) -> Fit:
+        """A fit from this point to its end, under random forces or waves where the point has them."""
         names = frozenset(effect.name for effect in start.structure.effects)
         free, has_forces = self.free(names), bool(start.noise[2:].any())
         inputs = self.inputs(names, for_filter=has_forces)

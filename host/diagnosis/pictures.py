@@ -70,7 +70,7 @@ def runs_picture(answer: Answer) -> str:
                 axis.axvspan(span.time[0], span.time[-1], color=JUDGING, zorder=-1)
     for alarm in recording.alarms:
         for axis in axes:
-            axis.axvline(alarm, color="#444444", linestyle="--", linewidth=1.0, label="alarm")
+            axis.axvline(alarm, color="#444444", linestyle="--", linewidth=1.0, label="change looked for")
     axes[0].invert_yaxis()
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False, ncols=4, markerscale=3)
     plane_trace(axes[4], recording)

@@ -78,7 +78,8 @@ def summary(answer: Answer) -> str:
     """The answer in a sentence or two."""
     found = answer.found
     if found.verdict == "no_mismatch":
-        return f"Nothing is missing: the {base_name(answer)} can reproduce this down to the sensors' noise."
+        lead = f"Nothing is missing: the {base_name(answer)} can reproduce this down to the sensors' noise."
+        return lead + _unchanged(found)
     if not found.effects and found.verdict == "explained":
         return "The given model lacks no physics, but what it holds is not what the recording shows."
     if not found.effects and not unknown_in(found.extended):
@@ -98,10 +99,15 @@ def summary(answer: Answer) -> str:
         if found.effects
         else f"None of the physics in the catalogue explains it, but {listed} comes near.",
     }[found.verdict]
-    is_alarmed = any(recording.alarms for recording in found.recordings)
-    has_changed = any(effect.name in SCANS for effect in found.effects)
-    unchanged = " Near the alarm nothing was found to have changed." * (is_alarmed and not has_changed)
-    return f"{lead} With it, {gain} {where}.{unchanged}"
+    return f"{lead} With it, {gain} {where}.{_unchanged(found)}"
+
+
+def _unchanged(found: Diagnosis) -> str:
+    """That nothing changed where it was looked for, if so."""
+    moments = [f"{alarm:.0f} s" for recording in found.recordings for alarm in recording.alarms]
+    if not moments or any(effect.name in SCANS for effect in found.effects):
+        return ""
+    return f" Near {', '.join(moments)} nothing was found to have changed."
 
 
 def _dated(effect: NamedEffect) -> str:

@@ -51,4 +51,4 @@ def with_regular_waves(fitter: Fitter, explanation: Explanation, white: Fit) -> 
     plain = fitter.explained(explanation.names, fitter.carried_on(start))
     if "surface_waves" in plain.names:
         return plain
-    return fitter.grown(plain, "surface_waves", [np.array([0.01, 0.01, 2.0 * np.pi / fit.waves[0]])])
+    return fitter.grown(plain, "surface_waves", [np.array([0.0, 0.0, 2.0 * np.pi / fit.waves[0]])])

@@ -55,16 +55,20 @@ class Workers:
 
 def _open(*arguments: Any) -> None:
     global _fitter
-    threading.Thread(target=_leave_with_parent, daemon=True).start()
+    leave_with_parent()
     _fitter = Fitter(*arguments)
 
 
-def _leave_with_parent() -> None:
-    """A worker whose parent was killed would wait for work for ever."""
+def leave_with_parent() -> None:
+    """Ends this worker when its parent is gone: it would wait for work for ever if that was killed."""
     parent = multiprocessing.parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(1)
+
+    def watch() -> None:
+        if parent is not None:
+            wait([parent.sentinel])
+            os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _call(method: str, arguments: tuple[Any, ...]) -> Any:

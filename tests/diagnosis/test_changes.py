@@ -45,12 +45,11 @@ def test_what_changed_is_named_with_its_size_and_its_moment(
     found = diagnose([replace(hidden_dive(extra, seed=4, duration=120.0), alarms=(TOLD,))])
     assert found.verdict == "explained"
     (effect,) = found.effects
-    assert name == effect.name or name in effect.twins
-    if name == effect.name:
-        value, std, _ = effect.coefficients[parameter]
-        assert abs(value - size) < 4.0 * std
-        moment, std, _ = effect.coefficients[f"{name}_time"]
-        assert abs(moment - WHEN) < max(4.0 * std, 0.2)
+    assert effect.name == name
+    value, std, _ = effect.coefficients[parameter]
+    assert abs(value - size) < 4.0 * std
+    moment, std, _ = effect.coefficients[f"{name}_time"]
+    assert abs(moment - WHEN) < max(4.0 * std, 0.2)
 
 
 def test_nothing_is_said_to_have_changed_after_a_false_alarm() -> None:

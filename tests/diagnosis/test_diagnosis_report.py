@@ -42,7 +42,7 @@ def test_after_an_alarm_it_is_said_what_changed_and_when_or_that_nothing_did(
     coupled: Diagnosis, tmp_path: Path
 ) -> None:
     alarmed = replace(coupled, recordings=[replace(r, alarms=(60.0,)) for r in coupled.recordings])
-    assert "Near the alarm nothing was found to have changed" in page(Answer(found=alarmed), tmp_path)
+    assert "Near 60 s nothing was found to have changed" in page(Answer(found=alarmed), tmp_path)
     coefficients = {"current_step": (0.03, 0.001, "m/s"), "current_change_time": (47.2, 0.1, "s")}
     change = NamedEffect(name="current_change", delta_bic=99.0, coefficients=coefficients)
     shown = page(Answer(found=replace(alarmed, effects=[change])), tmp_path)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from host.prediction_window import PredictionWindow, Reference
-from tools.bench_alarm import FAULTS, STEP, Dive, errors, scenario_of, size_of
+from tools.bench_alarm import FAULTS, STEP, Dive, errors, recorded, scenario_of, size_of
 
 REFERENCE = Reference(a1=-0.63, a2=-3.39, a3=-8.2, b1=0.41, b2=-3.94, u0=2.5)
 
@@ -32,3 +32,13 @@ def test_a_fault_is_sized_to_double_the_prediction_error() -> None:
     assert size is not None
     fault.happens(dive.plant, size)
     assert errors(dive, window, REFERENCE, 30.0).max() > np.min(1.5 * usual)
+
+
+def test_an_alarmed_dive_is_recorded_as_its_journal_would_be_read() -> None:
+    dive = Dive(scenario_of("calm"), 3)
+    samples = [dive.sample() for _ in range(50)]
+    recording = recorded(samples, samples[30].t_us)
+    assert recording.alarms == (pytest.approx(recording.time[30]),)
+    assert np.diff(recording.time) == pytest.approx(STEP)
+    assert recording.depth[7] == samples[7].depth
+    assert recording.rudder[7] == samples[7].rudder
