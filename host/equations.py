@@ -164,6 +164,16 @@ class Structure:
         return np.clip(parameters, [p.lower for p in self.parameters], [p.upper for p in self.parameters])
 
     @cached_property
+    def moments(self) -> frozenset[str]:
+        """Names of the parameters that say when something happened, or how long it lasts, s."""
+        return frozenset(
+            parameter.name
+            for effect in self.effects
+            for parameter, scale in zip(effect.parameters, effect.scales, strict=False)
+            if scale == "duration"
+        )
+
+    @cached_property
     def states(self) -> tuple[str, ...]:
         return STATES + tuple(effect.state for effect in self.effects if effect.state is not None)
 

@@ -35,7 +35,8 @@ def covariance_within(fit: Fit) -> Array:
     inverse = _safe_inverse(M)
     if not all(is_white(e) for e in fit.whitened):
         half = inverse @ _root(_coloured_information(fit))
-        inverse = half @ half.T  # no variance comes out negative, however little the recording tells
+        blind = np.diag(np.where(np.diag(M) > 0.0, 0.0, np.diag(inverse)))  # what is not seen has no colour
+        inverse = half @ half.T + blind  # no variance is negative, however little the recording tells
     full = np.zeros((free.size, free.size))
     full[np.ix_(free, free)] = inverse
     return full

@@ -115,11 +115,10 @@ def diagnose(
     has_sea = best.fit.has_process_noise
     on_progress("final fit on everything")
     base, extended = _refitted(search.base, recordings), _refitted(model, recordings)
-    deviations = np.sqrt(np.diag(covariance(extended.fit)))
-    std = dict(zip(extended.fit.structure.names, deviations.tolist(), strict=True))
+    longest = max(recordings, key=lambda recording: recording.duration)
+    std = deviations(extended, longest)
     values = dict(zip(extended.fit.structure.names, extended.fit.parameters.tolist(), strict=True))
     effects = [_with_coefficients(effect, values, std) for effect in effects]
-    longest = max(recordings, key=lambda recording: recording.duration)
     errors = free_run_errors(base, longest)
     return Diagnosis(
         verdict=verdict,
@@ -193,6 +192,18 @@ def _refitted(explanation: Explanation, recordings: list[Recording]) -> Explanat
     fitter = Fitter(recordings, known=explanation)
     again = fitter.across(fitter.refitted(explanation))
     return with_sea(fitter, again) if explanation.fit.has_process_noise else again
+
+
+def deviations(extended: Explanation, longest: Recording) -> dict[str, float]:
+    """Standard deviations of all coefficients by name, those of moments within the recording.
+
+    While the plane rests nothing tells when its effect changed; but a moment drawn anywhere in the recording
+    would deviate by no more than duration / sqrt(12).
+    """
+    structure = extended.fit.structure
+    std = dict(zip(structure.names, np.sqrt(np.diag(covariance(extended.fit))).tolist(), strict=True))
+    most = longest.duration / np.sqrt(12.0)
+    return std | {name: min(std[name], most) for name in structure.moments}
 
 
 def _slots(

@@ -217,12 +217,24 @@ class Fitter:
             for recording in self.recordings
         ]
         start = Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0]))
+        if structure.moments:
+            start = self._begun(start)
         fit = self._fit([start])
         if self.excess(fit) > NOT_THERE * self.excess(explanation.fit):
             inputs = self.inputs(explanation.names, for_filter=True)
             moved = annealed(start, inputs, fit.free, self.accelerations)
             fit = self._fit([start, moved])
         return self.polished(self.explained(explanation.names, fit), EXACT)
+
+    def _begun(self, start: Point) -> Point:
+        """The point with its initial states found, moments held: until then those would run away.
+
+        A moment beyond the recordings makes no difference any more, and never comes back.
+        """
+        names = frozenset(effect.name for effect in start.structure.effects)
+        settled = np.array([name not in start.structure.moments for name in start.structure.names])
+        fit = output_error(start, self.inputs(names), self.free(names) & settled, FIRST_ITERATIONS, TOLERANCE)
+        return Point(fit.structure, fit.parameters, fit.initial, fit.noise)
 
     def free(self, names: Names) -> Mask:
         """Which parameters of a set are estimated."""

@@ -7,6 +7,7 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import named, structure_of
+from host.diagnosis.diagnose import deviations
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.prospects import probed
@@ -33,6 +34,30 @@ def test_a_change_too_small_to_be_seen_from_another_moment_is_found() -> None:
     assert values["effectiveness_time"] == pytest.approx(WEAKENED_AT, abs=0.5)
     assert values["effectiveness_step"] == pytest.approx(-0.02, abs=0.005)
     assert found.bic < fitter.base.bic - 20.0
+
+
+def test_a_moment_stays_where_it_was_while_another_stretch_is_settled() -> None:
+    def weaker(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+        lost = -0.004 * plane * (time > 60.0)
+        return lost * BASE["b1"], lost * BASE["b2"], 0.0
+
+    under_way = hidden_dive(weaker, seed=5, duration=120.0).between(21.0, 120.0)
+    fitter = Fitter([under_way])
+    first = [np.array([-0.004, 60.0])]
+    found = fitter.polished(fitter.grown(fitter.base, "rudder_effectiveness_change", first))
+    again = Fitter([under_way], known=found).refitted(found)
+    index = again.fit.structure.names.index("effectiveness_time")
+    assert again.fit.parameters[index] == pytest.approx(60.0, abs=2.0)
+    assert again.bic < found.bic + 1.0
+
+
+def test_a_moment_of_which_nothing_tells_is_uncertain_by_no_more_than_the_recording() -> None:
+    plain = hidden_dive(seed=2)
+    fitter = Fitter([replace(plain, rudder=np.where(plain.time > 30.0, 0.0, plain.rudder))])
+    name = "rudder_effectiveness_change"
+    start = fitter.point(frozenset({name}), fitter.base, name, np.array([-0.1, 60.0]))
+    found = fitter.explained(frozenset({name}), fitter.carried_on(start))
+    assert deviations(found, plain)["effectiveness_time"] == plain.duration / np.sqrt(12.0)
 
 
 @pytest.mark.parametrize("name", ["pitch_sensor_lag", "actuator_lag"])

@@ -45,8 +45,8 @@ def test_drawing_is_repeatable_and_its_effects_can_be_seen(number: int, card: Ca
     drawn, again = draw(5, number, card), draw(5, number, card)
     assert drawn.answer == again.answer
     assert all(np.array_equal(drawn.table[c], again.table[c], equal_nan=True) for c in drawn.table)
-    least = FOREIGN_MISFIT[0] if card.case == "outside" else MISFIT[0]
-    assert all(least / 1.31 < misfit < MISFIT[1] * 1.31 for misfit in drawn.answer.misfits.values())
+    least = FOREIGN_MISFIT if card.case == "outside" else MISFIT
+    assert all(misfit >= least for misfit in drawn.answer.misfits.values())
     assert set(drawn.answer.misfits) == set(card.names)
     assert tuple(drawn.answer.hidden) == card.names
     floor = drawn.answer.floor
@@ -103,7 +103,7 @@ def test_a_replayed_run_is_the_same_run() -> None:
 def test_what_is_hidden_can_be_seen_beside_all_that_real_vehicles_have() -> None:
     drawn = draw(31, 8, Card("one", ("net_buoyancy",)), has_usual=True).answer
     assert drawn.usual == [*SHARES]
-    assert drawn.misfits["net_buoyancy"] >= MISFIT[0]
+    assert drawn.misfits["net_buoyancy"] >= MISFIT
     assert drawn.coefficients["large_angle_restoring"] == {"restoring_share": pytest.approx(1.0)}
     plain = draw(31, 8, Card("one", ("net_buoyancy",))).answer
     assert plain.usual == []

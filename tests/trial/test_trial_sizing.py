@@ -1,4 +1,4 @@
-"""Refits, strengths, and the coefficients that an answer claims."""
+"""Refits, and the coefficients that an answer claims."""
 
 from dataclasses import replace
 
@@ -11,7 +11,6 @@ from tools.trial.hidden import KINDS, STRANGERS, Setting, draw_hidden
 from tools.trial.linear import MORE, free_run
 from tools.trial.outing import draw_outing, with_amplitude
 from tools.trial.refit import remaining
-from tools.trial.sizing import WEAKEST, strength_for
 from tools.trial.vehicle import draw_vehicle
 from tools.trial.voyage import sail
 
@@ -39,27 +38,6 @@ def test_remaining_of_a_bent_model_with_and_without_learnt_slopes(is_dear: bool)
 
 def test_remaining_of_a_run_that_fails_is_endless() -> None:
     assert remaining(lambda sets: np.full((len(sets), 4), np.inf), np.zeros(2), np.ones(2)) == np.inf
-
-
-@pytest.mark.parametrize(
-    "misfit_at",
-    [
-        lambda s: 1e6 * s**2,
-        lambda s: 1e9 * s**4,
-        lambda s: 0.0 if s < 0.3 else 1e4 * (s - 0.3),
-        lambda s: np.inf if s > 0.02 else 1e8 * s**2,
-    ],
-)
-def test_strength_reaches_the_wanted_misfit(misfit_at: object) -> None:
-    strength = strength_for(900.0, misfit_at)  # type: ignore[arg-type]
-    assert strength is not None
-    assert 900 / 1.3 < misfit_at(strength) < 900 * 1.3  # type: ignore[operator]
-
-
-def test_no_strength_where_even_the_strongest_cannot_be_seen_or_the_weakest_is_too_much() -> None:
-    assert strength_for(900.0, lambda s: 10.0 * s) is None
-    assert strength_for(900.0, lambda s: 1e9 + s) is None
-    assert WEAKEST < 1e-4
 
 
 @pytest.mark.parametrize(

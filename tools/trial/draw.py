@@ -18,16 +18,17 @@ from tools.trial.sizing import (
     is_ordinary,
     linear_misfit,
     misfit_beside,
-    strength_for,
     yardstick,
 )
 from tools.trial.usual import draw_usual
 from tools.trial.vehicle import draw_vehicle, log_uniform
 from tools.trial.voyage import Voyage, sail
 
-MISFIT = (50.0, 20000.0)
-"""What a hidden effect leaves of chi2 once the linear equations are fitted to it; logarithm uniform."""
-FOREIGN_MISFIT = (500.0, 20000.0)
+STRENGTHS = (0.01, 1.0)
+"""Of the strongest ordinary size, logarithm uniform: weaker, nobody would call it missing physics."""
+MISFIT = 50.0
+"""What a hidden effect leaves of chi2 at least, once the linear equations are fitted to it."""
+FOREIGN_MISFIT = 500.0
 """The same outside the catalogue, beyond all linear equations, as part of it is explained by those inside."""
 MOST_COMMAND = 0.45  # rad, where planes have their stops
 MOST_ATTEMPTS = 200
@@ -103,8 +104,8 @@ def _attempt(rng: np.random.Generator, number: int, card: Card, has_usual: bool)
         misfits = {hidden[0].name: linear_misfit(voyage, outing, setting, noise, beyond)}
     for effect in hidden if len(acting) > 1 else ():
         others = tuple(other for other in acting if other is not effect)
-        misfit = misfit_beside(voyage, outing, seed, others, setting, noise, MISFIT[0])
-        if misfit < MISFIT[0]:
+        misfit = misfit_beside(voyage, outing, seed, others, setting, noise, MISFIT)
+        if misfit < MISFIT:
             return None
         misfits[effect.name] = misfit
     return _written(number, card, outing, seed, setting, noise, hidden, usual, voyage, misfits)
@@ -135,22 +136,18 @@ def _sized_to_pitch(
 def _sized(
     rng: np.random.Generator, effect: Hidden, outing: Outing, seed: int, setting: Setting, noise: Yardstick
 ) -> Hidden | None:
-    wanted = log_uniform(rng, *(FOREIGN_MISFIT if effect.is_foreign else MISFIT))
-
-    def misfit_at(strength: float) -> float:
-        try:
-            voyage = sail(outing.scenario, seed, (with_strength(effect, strength),), setting)
-        except ScenarioError:
-            return np.inf
-        if not is_ordinary(voyage):
-            return np.inf
-        return linear_misfit(voyage, outing, setting, noise, effect.is_foreign)
-
-    strength = strength_for(wanted, misfit_at)
-    if strength is None:
+    """At a drawn strength; None where it cannot be seen, or tears the vehicle out of the water."""
+    effect = with_strength(effect, log_uniform(rng, *STRENGTHS))
+    if not effect.deserves_its_name(setting):
         return None
-    effect = with_strength(effect, strength)
-    return effect if effect.deserves_its_name(setting) else None
+    try:
+        voyage = sail(outing.scenario, seed, (effect,), setting)
+    except ScenarioError:
+        return None
+    if not is_ordinary(voyage):
+        return None
+    misfit = linear_misfit(voyage, outing, setting, noise, effect.is_foreign)
+    return effect if misfit >= (FOREIGN_MISFIT if effect.is_foreign else MISFIT) else None
 
 
 def _written(

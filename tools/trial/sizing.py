@@ -1,6 +1,5 @@
-"""How strong a hidden effect must be for a wanted misfit, and whether it stays visible beside another."""
+"""Whether a hidden effect can be seen at all, and beside another."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,8 +16,6 @@ from tools.trial.voyage import Voyage, sail
 
 Array = npt.NDArray[np.float64]
 
-WEAKEST = 1e-5
-NEAR_ENOUGH = 1.3  # factor between the wanted and the reached misfit
 MOST_PITCH = 1.0  # rad; no vehicle of this kind goes further
 LEAST_DEPTH = 1.0  # m, or the hull would leave the water
 
@@ -138,27 +135,3 @@ def misfit_beside(
         return np.array(rows)
 
     return remaining(model, first, steps, most_iterations=6, least=least, is_dear=True)
-
-
-def strength_for(wanted: float, misfit_at: Callable[[float], float]) -> float | None:
-    """The strength within [WEAKEST, 1] whose misfit is near `wanted`; None where there is none.
-
-    Misfits grow with the square of most effects; where they do not, the bracket is halved in the logarithm.
-    """
-    low, high, strength = WEAKEST, 1.0, 0.05
-    for _ in range(12):
-        misfit = misfit_at(strength)
-        if wanted / NEAR_ENOUGH < misfit < wanted * NEAR_ENOUGH:
-            return strength
-        if misfit < wanted:
-            low = strength
-        else:
-            high = strength
-        if high / low < 1.001:
-            return None
-        guess = strength * (wanted / misfit) ** 0.5 if np.isfinite(misfit) and misfit > 0.0 else 0.0
-        if guess >= high and high == 1.0 and strength < 1.0:
-            strength = 1.0
-        else:
-            strength = guess if low * 1.02 < guess < high / 1.02 else (low * high) ** 0.5
-    return None
