@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import periodogram
 from scipy.stats import chi2
 
 from host.catalogue.unknown import ANY_SMOOTH_FORCE
@@ -15,17 +14,16 @@ from host.equations import NAMES
 from host.fit import Fit
 from host.noise_floor import is_quantised
 from host.recording import Array, Recording
-from host.whiteness import correlation_factor, is_white
+from host.whiteness import correlation_factor, is_even, is_white
 
 SIGNIFICANCE = 1e-4
 SEA_DOUBT = 1.5  # no sea is as white and steady as the filter takes it to be
-GROUPS = 10
+GROUPS, LEAST_IN_GROUP = 10, 5
 LEAST_SEA = 0.003  # m/s; below it physics left out, not moving water, is what passes for noise
 MOVEMENT_SPAN = 0.5  # s
 FLOOR_DOUBT = 1.3  # times the noise floor, which no sensor keeps to exactly
 FLOOR_SPREAD = 14.0  # over the root of the samples: 4.5 relative deviations of the floor's own estimate
 ROUNDING_DOUBT = 2.0  # the same where rounding rules: noise adds to it and is hidden by it
-SLOW_SPREAD = 2.3  # of the cumulative periodogram (Kolmogorov's distribution at 5e-5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +68,7 @@ def leftover(fitter: Fitter, best: Explanation) -> Leftover:
     gain = fitter.gain(best, ANY_SMOOTH_FORCE.name, [], is_thorough=True) / correlation_factor(fit.whitened)
     terms = len(ANY_SMOOTH_FORCE.parameters)
     return Leftover(
-        is_coloured=not all(is_white(e, significance=SIGNIFICANCE) and _is_even(e) for e in innovations),
+        is_coloured=not all(is_white(e, significance=SIGNIFICANCE) and is_even(e) for e in innovations),
         is_local=_is_local(fitter.recordings, even),
         is_no_sea=fit.has_process_noise and not fit.waves.any() and _heave_by_sea(fit) < LEAST_SEA,
         is_above_floor=bool((fit.noise[:2] > doubt * fitter.floor).any()),
@@ -94,27 +92,15 @@ def _is_local(recordings: list[Recording], innovations: list[Array]) -> bool:
         warnings.simplefilter("ignore", RuntimeWarning)  # rows without any measurement
         squares = np.concatenate([np.nanmean(np.atleast_2d(e**2), axis=0) for e in innovations])
     moved = [np.abs(np.gradient(gaussian_filter1d(r.rudder, MOVEMENT_SPAN / r.step))) for r in recordings]
+    known = np.isfinite(squares)
+    if known.sum() < LEAST_IN_GROUP * GROUPS:
+        return False
+    values = squares[known]
     # Not by pitch: a group of measured angles is one of errors, too.
     for quantity in (np.concatenate([r.rudder for r in recordings]), np.concatenate(moved)):
-        known = np.isfinite(squares)
-        values = squares[known]
         groups = np.array_split(np.argsort(quantity[known], kind="stable"), GROUPS)
         means = np.array([values[group].mean() for group in groups])
         scatter = np.array([values.var() / group.size for group in groups])
         if np.sum((means - values.mean()) ** 2 / scatter) > chi2.isf(SIGNIFICANCE, GROUPS - 1):
             return True
     return False
-
-
-def _is_even(innovations: Array) -> bool:
-    """Bartlett's test: the power of white noise grows evenly over the frequencies."""
-    for values in innovations:
-        known = np.isfinite(values)
-        if known.sum() < 100:
-            continue
-        _, power = periodogram(np.where(known, values - values[known].mean(), 0.0))
-        cumulated = np.cumsum(power[1:]) / power[1:].sum()
-        even = np.arange(1, cumulated.size + 1) / cumulated.size
-        if np.max(np.abs(cumulated - even)) * np.sqrt(cumulated.size) > SLOW_SPREAD:
-            return False
-    return True

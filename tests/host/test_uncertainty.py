@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 
 from host.maximum_likelihood import fit_maximum_likelihood
 from host.uncertainty import covariance
-from host.whiteness import autocovariance, crosscovariance, is_white
+from host.whiteness import autocovariance, clustering, crosscovariance, is_even, is_white
 
 
 def test_white_noise_is_white_and_filtered_noise_is_not() -> None:
@@ -22,6 +22,24 @@ def test_what_never_changes_tells_nothing_against_whiteness(constant: float) -> 
     white = np.random.default_rng(5).normal(size=(1, 500))
     assert is_white(np.vstack([white, np.full(500, constant)]))
     assert not is_white(np.vstack([np.full(500, constant), np.cumsum(white)]))
+
+
+def test_white_noise_whose_variance_comes_and_goes_is_white_and_what_it_hides_is_not() -> None:
+    rng = np.random.default_rng(4)
+    rejected = 0
+    for _ in range(50):
+        near_an_edge = np.repeat(rng.random(200) < 0.2, 10)  # of a step of rounding
+        white = rng.standard_normal((1, 2000)) * np.where(near_an_edge, 1.0, 0.05)
+        rejected += not is_white(white)
+    assert rejected <= 2
+    assert clustering(white[0]) > 1.3
+    assert clustering(rng.standard_normal(2000)) == pytest.approx(1.0, abs=0.1)
+    assert not is_white(np.asarray(lfilter([1.0], [1.0, -0.5], white)))
+    by_large_stretches = rng.standard_normal((300, 2000)) * np.repeat(
+        rng.random((300, 20)) < 0.15, 100, axis=1
+    )
+    assert sum(not is_even(row[None]) for row in by_large_stretches) <= 3
+    assert not is_even(white + 0.3 * np.sin(np.arange(2000) / 300.0))
 
 
 def test_gaps_do_not_colour_white_noise() -> None:

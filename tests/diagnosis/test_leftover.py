@@ -1,0 +1,21 @@
+"""What an explanation leaves, by the innovations of each kind of reading."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+from hidden_dive import hidden_dive
+
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.leftover import leftover
+
+
+def test_the_right_model_leaves_nothing_where_all_readings_are_rounded() -> None:
+    dive, degree_tenth = hidden_dive(seed=1, noise=0.3), np.deg2rad(0.1)
+    rounded = replace(
+        dive, depth=np.round(dive.depth, 1), pitch=np.round(dive.pitch / degree_tenth) * degree_tenth
+    )
+    fitter = Fitter([rounded])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert leftover(fitter, fitter.base).is_nothing
