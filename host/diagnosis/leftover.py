@@ -60,8 +60,6 @@ def leftover(fitter: Fitter, best: Explanation) -> Leftover:
     """
     fit = best.fit
     rounded = is_quantised(fitter.recordings)
-    counts = np.sum([np.isfinite(e).sum(axis=1) for e in fit.whitened], axis=0)
-    doubt = np.where(rounded, ROUNDING_DOUBT, np.maximum(FLOOR_DOUBT, 1.0 + FLOOR_SPREAD / np.sqrt(counts)))
     even = [e[~rounded] for e in fit.whitened]
     by_intervals = (fitter.steps > 0.0) & (not fit.has_process_noise)
     innovations = [e[~rounded | by_intervals] for e in fit.whitened]
@@ -71,10 +69,18 @@ def leftover(fitter: Fitter, best: Explanation) -> Leftover:
         is_coloured=not all(is_white(e, significance=SIGNIFICANCE) and is_even(e) for e in innovations),
         is_local=_is_local(fitter.recordings, even),
         is_no_sea=fit.has_process_noise and not fit.waves.any() and _heave_by_sea(fit) < LEAST_SEA,
-        is_above_floor=bool((fit.noise[:2] > doubt * fitter.floor).any()),
+        is_above_floor=is_above_floor(fitter, fit),
         smooth_gain=gain,
         is_smooth=bool(gain > chi2.isf(SIGNIFICANCE, terms) * (SEA_DOUBT if fit.has_process_noise else 1.0)),
     )
+
+
+def is_above_floor(fitter: Fitter, fit: Fit) -> bool:
+    """Whether the sensor noise of a fit is more than the sensors show, beyond the doubt about those."""
+    counts = np.sum([np.isfinite(e).sum(axis=1) for e in fit.whitened], axis=0)
+    doubt = np.maximum(FLOOR_DOUBT, 1.0 + FLOOR_SPREAD / np.sqrt(counts))
+    doubt = np.where(is_quantised(fitter.recordings), ROUNDING_DOUBT, doubt)
+    return bool((fit.noise[:2] > doubt * fitter.floor).any())
 
 
 def _heave_by_sea(fit: Fit) -> float:

@@ -12,7 +12,8 @@ from host.catalogue import ORDINARY
 from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE
 from host.diagnosis.explanation import Explanation
-from host.diagnosis.margins import FEW, LITTLE, SMALL, margin
+from host.diagnosis.leftover import is_above_floor
+from host.diagnosis.margins import FEW, LITTLE, MUCH, SMALL, margin
 from host.diagnosis.pruning import pruned
 from host.diagnosis.workers import Task
 
@@ -20,17 +21,16 @@ if TYPE_CHECKING:
     from host.diagnosis.search import Search
 
 MOST_BESIDE = 3  # effects beside those that every vehicle has
+HARDLY_LESS = 0.95  # of what is left over the noise floor: another effect beside so many leads nowhere
 
 
 def together(search: "Search", leading: Explanation) -> Explanation | None:
-    """The leading set with all that every vehicle has, and more if need be, pruned; None if much is left."""
+    """The leading set with all that every vehicle has, more if need be, pruned; None if too much is left."""
     search.on_progress("what every vehicle has")
-    best = with_ordinary(search, leading)
-    for count in range(MOST_BESIDE + 1):
-        if search.fitter.excess(best.fit) < LITTLE:
-            best = pruned(search, best)
-            return best if best.bic < leading.bic else None
-        if count == MOST_BESIDE:
+    fitter, best = search.fitter, with_ordinary(search, leading)
+    left = fitter.excess(best.fit)
+    for _ in range(MOST_BESIDE):
+        if left < LITTLE:
             break
         found = search.workers.results(_more(search, best))
         near = search.polished_near(found, min(e.bic for e in found))
@@ -39,7 +39,13 @@ def together(search: "Search", leading: Explanation) -> Explanation | None:
             break
         best = better
         search.joint.add(best.names)
-    return None
+        before, left = left, fitter.excess(best.fit)
+        if left > MUCH and left > HARDLY_LESS * before:
+            return None
+    if left > LITTLE and is_above_floor(fitter, best.fit):
+        return None
+    best = pruned(search, best)
+    return best if best.bic < leading.bic else None
 
 
 def completed(search: "Search", best: Explanation) -> Explanation:
