@@ -27,7 +27,7 @@ from host.whiteness import correlation_factor
 
 STRIDES = (0.12, 0.3, 0.55, 1.8, 3.3, 8.0)  # times a1
 FEW_ITERATIONS, ROUGHLY = 6, 0.3
-WORTH_ENTERING = 40.0  # of a log-likelihood below the best, that a point of the profile may lie
+WORTH_ENTERING = 100.0  # of a log-likelihood below the best, that a point of the profile may lie
 ALMOST_AS_LIKELY = 3.0  # of a log-likelihood: odds of 20 to 1 and less rule nothing out
 USUAL_LEVER = 0.1  # m: b1/b2 of a plane at the stern of a small vehicle
 NEARLY_REAL = 0.3  # of its real part, the imaginary part of a pole that may be two

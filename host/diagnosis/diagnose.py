@@ -18,6 +18,7 @@ from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.sea_fits import with_sea
 from host.diagnosis.search import Search
 from host.diagnosis.seas import WAVES, Waves, among_waves, in_a_sea
+from host.diagnosis.smooth_speed import with_smooth_speed
 from host.diagnosis.spans import Spans, divide, excerpt
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.unknown_physics import known_in, unknown_in, with_unknown
@@ -87,9 +88,9 @@ def diagnose(
 ) -> Diagnosis:
     """Finds what the paper's equations lack on these recordings of one vehicle, on `jobs` cores.
 
-    Spikes are left out first: they are no physics.
+    Spikes and the noise of the measured speed are left out first: they are no physics.
     """
-    recordings = without_outliers(recordings)
+    recordings = [with_smooth_speed(recording) for recording in without_outliers(recordings)]
     floor = noise_floor(recordings)
     spans = divide(recordings)
     on_progress("base model")

@@ -29,6 +29,7 @@ BEAM = 4  # single effects carried on
 FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
 NARROW = 2  # of larger sets, which cost most and of which there are most
 PROMISING = 6
+CONTENDERS = 3  # for the place of the leading set
 MOST_ROUNDS = 4
 
 Progress = Callable[[str], None]
@@ -220,6 +221,11 @@ class Search:
         free = sorted((e for e in free if not self._has_idle_member(e)), key=lambda e: e.bic)
         polished = self.polished_near(free[: 2 * BEAM], free[0].bic)
         leading = min(polished, key=lambda e: e.bic)
+        # Those that come close may sit in poorer valleys than it does.
+        close = sorted((e for e in polished if e.bic < leading.bic + ROUGH), key=lambda e: e.bic)
+        if len(close) > 1 and len(leading.names) <= LARGEST_SET:
+            polished = self.across(close[:CONTENDERS]) + close[CONTENDERS:]
+            leading = min(polished, key=lambda e: e.bic)
         polished = [e for e in polished if e.bic < leading.bic + 2.0 * NAMING_MARGIN]
         if len(leading.names) > LARGEST_SET:
             polished = [leading]
