@@ -179,7 +179,7 @@ class Search:
 
         The prediction is local. A base bent far from the truth hides what the common effects, which trade
         against its own coefficients, would gain once all of them are free; so until little is left these
-        are always tried.
+        are always tried, unless all at once.
         """
         others = self._candidates(parent)
         if size == 1 and not self.root.fit.has_process_noise:
@@ -188,7 +188,8 @@ class Search:
         best = sorted(gains, key=lambda name: -gains[name])[: PROMISING if size == 2 else FEW]
         worth = {name for name in best if gains[name] > NAMING_MARGIN}
         is_far = size <= 2 and self.fitter.excess(parent.fit) > LITTLE
-        is_far &= not self.root.fit.has_process_noise
+        # What every vehicle has was tried at once and leads nowhere, if it was.
+        is_far &= not self.root.fit.has_process_noise and not self.joint
         return [name for name in others if name in worth or (is_far and named(name).is_common)]
 
     def values(self, name: str) -> list[Array]:
@@ -223,7 +224,7 @@ class Search:
         leading = min(polished, key=lambda e: e.bic)
         # Those that come close may sit in poorer valleys than it does.
         close = sorted((e for e in polished if e.bic < leading.bic + ROUGH), key=lambda e: e.bic)
-        if len(close) > 1 and len(leading.names) <= LARGEST_SET:
+        if len(close) > 1 and self.fitter.excess(leading.fit) < LITTLE:
             polished = self.across(close[:CONTENDERS]) + close[CONTENDERS:]
             leading = min(polished, key=lambda e: e.bic)
         polished = [e for e in polished if e.bic < leading.bic + 2.0 * NAMING_MARGIN]

@@ -55,6 +55,8 @@ def completed(search: "Search", best: Explanation) -> Explanation:
     """
     if len(best.names) <= SMALL or _was_joint(search, best) or search.root.fit.has_process_noise:
         return best
+    if search.joint and search.fitter.excess(best.fit) > MUCH:
+        return best  # they led nowhere beside less, too
     search.on_progress("what every vehicle has beside it")
     (joint,) = search.across([with_ordinary(search, best)])
     return min(best, pruned(search, joint), key=lambda e: e.bic)
