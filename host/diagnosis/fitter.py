@@ -216,9 +216,7 @@ class Fitter:
             np.array([0.0, 0.0, _first(recording.pitch), _first(recording.depth)])
             for recording in self.recordings
         ]
-        start = Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0]))
-        if structure.moments:
-            start = self._begun(start)
+        start = self._begun(Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0])))
         fit = self._fit([start])
         if self.excess(fit) > NOT_THERE * self.excess(explanation.fit):
             inputs = self.inputs(explanation.names, for_filter=True)
@@ -227,13 +225,13 @@ class Fitter:
         return self.polished(self.explained(explanation.names, fit), EXACT)
 
     def _begun(self, start: Point) -> Point:
-        """The point with its initial states found, moments held: until then those would run away.
+        """The point with its initial states found, all coefficients held: until then those would run away.
 
-        A moment beyond the recordings makes no difference any more, and never comes back.
+        A moment would go beyond the recordings, where it makes no difference any more, and never come back.
         """
-        names = frozenset(effect.name for effect in start.structure.effects)
-        settled = np.array([name not in start.structure.moments for name in start.structure.names])
-        fit = output_error(start, self.inputs(names), self.free(names) & settled, FIRST_ITERATIONS, TOLERANCE)
+        inputs = self.inputs(frozenset(effect.name for effect in start.structure.effects))
+        held = np.zeros(start.parameters.size, dtype=bool)
+        fit = output_error(start, inputs, held, FIRST_ITERATIONS, TOLERANCE)
         return Point(fit.structure, fit.parameters, fit.initial, fit.noise)
 
     def free(self, names: Names) -> Mask:

@@ -26,6 +26,8 @@ from host.propagate import LONGEST_SUBSTEP, Inputs, free_run, inputs_of
 from host.recording import Array, Recording
 
 SEPARATES = 2.0 * TWIN_MARGIN  # predicted chi2 that leaves no doubt after chance had its share
+MOST_FLOWN = 2  # manoeuvres, in simulation
+LEAST_CONFIRMED = 0.25 * SEPARATES  # of BIC: chance may take the rest
 MOST_CONFIRMED = 20_000  # rows; longer flights take long to fit
 LONGEST_FLIGHT = 1800.0  # s, of repeats of a manoeuvre that says little
 KNOWN_SPEED = 0.02  # m/s, deviation of a good speed sensor
@@ -95,30 +97,52 @@ def _separation(found: Diagnosis, name: str, twin: str, rival: Explanation) -> S
     flights = [flight for flight in flights if np.isfinite(flight.predicted)]
     if not flights:
         return base
-    best = max(flights, key=lambda flight: flight.predicted)
-    lacking = SEPARATES / max(best.predicted, 1e-9)
+    flights.sort(key=lambda flight: -flight.predicted)
+    for flight in flights[:MOST_FLOWN]:
+        long = _long_enough(found, flight, named, rival)
+        if long is None:
+            break
+        predicted, rows = long.predicted, long.manoeuvre.rudder.size
+        confirmed = long.confirmed() if rows <= MOST_CONFIRMED else float("nan")
+        told = replace(base, manoeuvre=long.manoeuvre, predicted=predicted, confirmed=confirmed)
+        if not confirmed < LEAST_CONFIRMED:
+            sentence = _fly(long.manoeuvre, name, twin, predicted, confirmed)
+            return replace(told, sentence=sentence, difference=long.difference())
+        base = replace(
+            told, manoeuvre=None, sentence=_in_vain(long.manoeuvre, name, twin, predicted, confirmed)
+        )
+    if np.isfinite(base.confirmed):
+        return base
+    return replace(base, predicted=flights[0].predicted, sentence=_none(found, flights, name, twin))
+
+
+def _long_enough(
+    found: Diagnosis, flight: "_Flight", named: Explanation, rival: Explanation
+) -> "_Flight | None":
+    """The flight repeated until it separates; None where that takes too long."""
+    lacking = SEPARATES / max(flight.predicted, 1e-9)
     # A longer flight also lets the twin re-adjust further: a quarter more than in proportion.
     repeats = int(np.ceil(min(1.25 * lacking, 1e6))) if lacking > 1.0 else 1
-    if repeats * best.manoeuvre.duration > LONGEST_FLIGHT:
-        return replace(base, predicted=best.predicted, sentence=_none(found, flights, name, twin))
-    if repeats > 1:
-        longer = replace(best.manoeuvre, rudder=np.tile(best.manoeuvre.rudder, repeats))
-        best = _Flight(found, named, rival, longer)
-    time = best.manoeuvre.duration
-    confirmed = best.confirmed() if best.manoeuvre.rudder.size <= MOST_CONFIRMED else float("nan")
+    if repeats * flight.manoeuvre.duration > LONGEST_FLIGHT:
+        return None
+    if repeats == 1:
+        return flight
+    longer = replace(flight.manoeuvre, rudder=np.tile(flight.manoeuvre.rudder, repeats))
+    return _Flight(found, named, rival, longer)
+
+
+def _fly(flown: Manoeuvre, name: str, twin: str, predicted: float, confirmed: float) -> str:
+    time = flown.duration
     lasting = f"{time:.0f} s" if time < 150.0 else f"{time / 60.0:.0f} min"
-    sentence = (
-        f"fly {best.manoeuvre.words}, for {lasting}: it tells {_title(name)} from {_title(twin)} "
-        f"(predicted chi2 {best.predicted:.0f}"
-    )
-    sentence += f"; flown in simulation it gave {confirmed:.0f} of BIC)" if np.isfinite(confirmed) else ")"
-    return replace(
-        base,
-        manoeuvre=best.manoeuvre,
-        predicted=best.predicted,
-        confirmed=confirmed,
-        sentence=sentence,
-        difference=best.difference(),
+    gave = f"; flown in simulation it gave {confirmed:.0f} of BIC" if np.isfinite(confirmed) else ""
+    told = f"it tells {_title(name)} from {_title(twin)} (predicted chi2 {predicted:.0f}{gave})"
+    return f"fly {flown.words}, for {lasting}: {told}"
+
+
+def _in_vain(flown: Manoeuvre, name: str, twin: str, predicted: float, confirmed: float) -> str:
+    return (
+        f"no manoeuvre is sure to tell {_title(name)} from {_title(twin)}: {flown.words} promises to "
+        f"(predicted chi2 {predicted:.0f}), but flown in simulation it gave {confirmed:.0f} of BIC"
     )
 
 

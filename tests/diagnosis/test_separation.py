@@ -56,6 +56,24 @@ def test_the_chosen_manoeuvre_does_in_simulation_what_was_predicted(coupled: Dia
     assert found.difference.shape == (2, found.manoeuvre.rudder.size)
 
 
+def test_a_manoeuvre_that_fails_in_simulation_is_not_recommended(
+    coupled: Diagnosis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flown = []
+
+    def in_vain(flight: _Flight) -> float:
+        flown.append(flight.manoeuvre.words)
+        return -50.0
+
+    monkeypatch.setattr(_Flight, "confirmed", in_vain)
+    (found,) = separations(with_twin(coupled, "depth_sensor_lag"))
+    assert found.manoeuvre is None
+    assert found.confirmed == -50.0
+    assert len(flown) == len(set(flown)) == 2
+    assert f"{flown[-1]} promises to" in found.sentence
+    assert "gave -50 of BIC" in found.sentence
+
+
 def test_an_event_of_the_recording_cannot_be_flown_again(coupled: Diagnosis) -> None:
     (found,) = separations(with_twin(coupled, "ballast_change"))
     assert found.manoeuvre is None
