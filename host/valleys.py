@@ -33,6 +33,7 @@ USUAL_LEVER = 0.1  # m: b1/b2 of a plane at the stern of a small vehicle
 NEARLY_REAL = 0.3  # of its real part, the imaginary part of a pole that may be two
 APART = 4.0  # standard deviations between two modes
 USUAL_SPEED, SPEED_FACTOR = 1.5, 3.0  # m/s; gliders make 0.3, torpedoes 10
+USUAL_DAMPING, DAMPING_FACTOR = -1.0, 5.0  # 1/s, of a1; gliders 0.1, small quick hulls 6
 A1, A2, A3, B1, B2, U0 = (NAMES.index(name) for name in ("a1", "a2", "a3", "b1", "b2", "u0"))
 LAGS, DEPTH_LAG, MUNK, COUPLING = ("lag_time", "pitch_lag_time"), "depth_lag_time", "c_qw", "c_wq"
 SHARING_POLES = (*LAGS, DEPTH_LAG, MUNK)  # parameters of effects that bring a pole of their own
@@ -139,19 +140,22 @@ def _with_pitch_poles(values: Array, one: float, other: float) -> Array:
 
 
 def plausibility(fit: Fit) -> float:
-    """By what ends of searches are compared: log-likelihood, and the log of the prior of its speed."""
+    """By what ends of searches are compared: log-likelihood, and the log of the prior."""
     return fit.log_likelihood + log_prior(fit)
 
 
 def log_prior(fit: Fit) -> float:
-    """Of a speed that is not held: log-normal about 1.5 m/s with a factor of 3.
+    """Of a speed and a heave damping that are not held: log-normal about 1.5 m/s and 1/s, factors of 3 and 5.
 
-    Whatever the data say decides, but that the vehicle hardly moves forward.
+    Whatever the data say decides, but that the vehicle hardly moves forward; or that its heave follows every
+    force at once, or none, where that is as likely as an ordinary hull.
     """
-    if not fit.free[U0]:
-        return 0.0
-    factors = log(max(fit.parameters[U0], 1e-3) / USUAL_SPEED) / log(SPEED_FACTOR)
-    return -0.5 * factors**2
+    known = ((U0, USUAL_SPEED, SPEED_FACTOR), (A1, USUAL_DAMPING, DAMPING_FACTOR))
+    return -0.5 * sum(
+        (log(max(fit.parameters[index] / usual, 1e-4)) / log(factor)) ** 2
+        for index, usual, factor in known
+        if fit.free[index]
+    )
 
 
 def with_rivals(fit: Fit, others: list[Fit]) -> Fit:

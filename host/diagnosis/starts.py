@@ -19,7 +19,7 @@ from host.equations import NAMES
 from host.gauss_newton import Point
 from host.output_error import annealed
 from host.recording import Array
-from host.valleys import USUAL_LEVER
+from host.valleys import USUAL_DAMPING, USUAL_LEVER
 
 if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
 FEW = 1  # members of a set, the free trim among them, that lacks the most
 # 1/s, of a1: a base that lacks an effect may follow its plane at once, or hardly at all.
-INSTANT, USUAL_DAMPING, IDLE = -10.0, -1.0, -0.1
+INSTANT, IDLE = -10.0, -0.1
 A1, B1, B2 = (NAMES.index(name) for name in ("a1", "b1", "b2"))
 
 

@@ -13,7 +13,7 @@ from host.maximum_likelihood import fit_maximum_likelihood
 from host.output_error import output_error
 from host.propagate import Inputs, inputs_of
 from host.uncertainty import covariance
-from host.valleys import USUAL_SPEED, other_valleys, plausibility, with_rivals
+from host.valleys import A1, USUAL_DAMPING, USUAL_SPEED, other_valleys, plausibility, with_rivals
 
 U0 = NAMES.index("u0")
 
@@ -43,18 +43,25 @@ def test_a_measured_or_held_speed_leaves_one_valley(two_ends: tuple[Fit, Fit, li
     best, _, inputs = two_ends
     held = best.free & (np.arange(best.free.size) != U0)
     assert other_valleys(replace(best, free=held), inputs) == []
+    held[A1] = False
     assert plausibility(replace(best, free=held)) == best.log_likelihood
 
 
-def test_a_vehicle_that_hardly_moves_forward_must_earn_it(two_ends: tuple[Fit, Fit, list[Inputs]]) -> None:
+@pytest.mark.parametrize(
+    ("index", "usual", "ordinary", "absurd"), [(U0, USUAL_SPEED, 0.3, 0.0), (A1, USUAL_DAMPING, -0.1, -1e-4)]
+)
+def test_an_unusual_speed_or_heave_damping_must_be_earned(
+    two_ends: tuple[Fit, Fit, list[Inputs]], index: int, usual: float, ordinary: float, absurd: float
+) -> None:
     best, _, _ = two_ends
+    lone = replace(best, free=np.arange(8) == index)
 
-    def at(speed: float) -> float:
-        return plausibility(replace(best, parameters=np.where(np.arange(8) == U0, speed, best.parameters)))
+    def at(value: float) -> float:
+        return plausibility(replace(lone, parameters=np.where(np.arange(8) == index, value, best.parameters)))
 
-    assert at(USUAL_SPEED) == best.log_likelihood
-    assert best.log_likelihood - 1.5 < at(0.3) < best.log_likelihood
-    assert at(0.0) < best.log_likelihood - 15.0
+    assert at(usual) == best.log_likelihood
+    assert best.log_likelihood - 1.5 < at(ordinary) < best.log_likelihood
+    assert at(absurd) < best.log_likelihood - 15.0
     assert plausibility(replace(best, log_likelihood=-np.inf)) == -np.inf
 
 
