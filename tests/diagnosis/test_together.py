@@ -1,0 +1,68 @@
+"""When to go on adding to what every vehicle has, and when to give up."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from host.diagnosis import together as module
+from host.diagnosis.together import completed, together
+
+
+class Rounds:
+    """A search whose sets leave, round by round, so many times the noise floor."""
+
+    def __init__(self, left: list[float], is_above_floor: bool, patch: pytest.MonkeyPatch) -> None:
+        self.sets = [
+            SimpleNamespace(names=frozenset(range(k + 4)), fit=excess, bic=-1000.0 * (k + 1))
+            for k, excess in enumerate(left)
+        ]
+        self.rounds = 0
+        self.joint: set[Any] = {self.sets[0].names}
+        self.tried: dict[Any, Any] = {}
+        self.root = SimpleNamespace(fit=SimpleNamespace(has_process_noise=False))
+        self.fitter = SimpleNamespace(excess=lambda fit: fit)
+        self.workers = SimpleNamespace(results=self._next)
+        self.leading = SimpleNamespace(names=frozenset({0}), fit=20.0, bic=0.0)
+        patch.setattr(module, "with_ordinary", lambda search, _: search.sets[0])
+        patch.setattr(module, "_more", lambda *_: [])
+        patch.setattr(module, "margin", lambda _: 6.0)
+        patch.setattr(module, "pruned", lambda _, best: best)
+        patch.setattr(module, "_was_joint", lambda *_: False)
+        patch.setattr(module, "is_above_floor", lambda *_: is_above_floor)
+
+    def on_progress(self, _: str) -> None: ...
+
+    def _next(self, _: list[Any]) -> list[Any]:
+        self.rounds += 1
+        return self.sets[self.rounds : self.rounds + 1] or [self.sets[-1]]
+
+    def polished_near(self, found: list[Any], _: float) -> list[Any]:
+        return found
+
+
+def found(search: Rounds) -> Any:
+    return together(search, search.leading)  # type: ignore[arg-type]
+
+
+def test_another_effect_that_takes_hardly_anything_away_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = Rounds([10.4, 10.1, 9.9, 9.8], True, monkeypatch)
+    assert found(search) is None
+    assert search.rounds == 1
+
+
+def test_as_long_as_less_is_left_more_join(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = Rounds([10.4, 6.0, 2.5, 1.05], True, monkeypatch)
+    assert found(search) is search.sets[3]
+
+
+def test_what_is_left_within_the_doubt_about_the_sensors_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = Rounds([1.26], False, monkeypatch)
+    assert found(search) is search.sets[0]
+    assert found(Rounds([1.26], True, monkeypatch)) is None
+
+
+def test_what_led_nowhere_beside_less_is_not_tried_beside_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = Rounds([10.4], True, monkeypatch)
+    best = SimpleNamespace(names=frozenset(range(10, 16)), fit=9.0, bic=-1.0)
+    assert completed(search, best) is best  # type: ignore[arg-type]
