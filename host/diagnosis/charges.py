@@ -2,6 +2,8 @@
 
 from math import log
 
+import numpy as np
+
 from host.catalogue import named
 from host.diagnosis.explanation import Names
 from host.fit import Fit
@@ -10,21 +12,35 @@ from host.valleys import log_prior
 
 RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exact twins
 LONELY = 8.0  # of BIC, against what seldom acts without another effect that is not there: odds of 50 to 1
+LEAST_COUPLING, MOST_COUPLING, COUPLING_SPREAD = 0.0, 0.8, 0.2  # of the forward speed
 
 
 def charged_bic(fit: Fit, names: Names, coefficients: int, longest: Recording) -> float:
     """Bayesian information criterion of a fit with so many free coefficients of effects; lower is better.
 
-    Charged as well: a speed that is hardly likely, what not every vehicle has, or not by itself, and the
-    choice among all the periods that an oscillation could have had.
+    Charged as well: a speed, a damping or a coupling that is hardly likely, what not every vehicle has, or
+    not by itself, and the choice among all the periods that an oscillation could have had.
 
     longest  of the recordings, which tells most periods apart
     """
     rare = sum(not named(name).is_common for name in names)
-    unlikely = -2.0 * log_prior(fit)
+    unlikely = -2.0 * log_prior(fit) + _strange_coupling(fit)
     chosen = sum(2.0 * log(_periods_within(named(name).periods, longest)) for name in names)
     lonely = sum(not {named(name).beside} <= names | {None} for name in names)
     return fit.bic + coefficients * log(fit.samples) + RARITY * rare + LONELY * lonely + unlikely + chosen
+
+
+def _strange_coupling(fit: Fit) -> float:
+    """Squared deviation of the coupling of pitch rate into heave from what masses allow; 0 within that.
+
+    c_wq / u0 = (m - Xu' + Zq) / (m - Zw'), where Xu' > Zw', as a hull carries more water along sideways than
+    ahead, and Zq < 0 of a tail (Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, ch. 8).
+    """
+    values = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
+    if "c_wq" not in values:
+        return 0.0
+    share = values["c_wq"] / max(values["u0"], 1e-3)
+    return float((share - np.clip(share, LEAST_COUPLING, MOST_COUPLING)) / COUPLING_SPREAD) ** 2
 
 
 def _periods_within(limits: tuple[float, float] | None, longest: Recording) -> float:

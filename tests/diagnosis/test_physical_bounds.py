@@ -29,6 +29,21 @@ def test_manoeuvres_slow_the_vehicle_and_geometry_acts_at_most_twice() -> None:
         assert (parameter.lower, parameter.upper) == (0, 2)
 
 
+def test_a_coupling_beyond_what_masses_allow_must_be_earned() -> None:
+    fitter, names = Fitter([hidden_dive(duration=40.0)]), frozenset({"heave_pitch_rate_coupling"})
+    fit = fitter.grown(fitter.base, "heave_pitch_rate_coupling", []).fit
+    speed = fit.parameters[fit.structure.names.index("u0")]
+
+    def charged(share: float) -> float:
+        values = fit.parameters.copy()
+        values[fit.structure.names.index("c_wq")] = share * speed
+        return fitter.bic(replace(fit, parameters=values), names)
+
+    assert charged(0.4) == pytest.approx(charged(0.75))
+    assert charged(-0.4) == pytest.approx(charged(0.4) + 4.0)
+    assert charged(1.4) == pytest.approx(charged(0.4) + 9.0)
+
+
 def test_a_force_that_drives_is_not_taken_for_drag() -> None:
     def driven(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
         return 0.8 * x[0] * abs(x[0]), 0.0, 0.0
