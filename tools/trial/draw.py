@@ -13,15 +13,9 @@ from tools.trial.coefficients import true_coefficients
 from tools.trial.deck import Card
 from tools.trial.hidden import KINDS, STRANGERS, Hidden, Setting, draw_hidden, switched, with_strength
 from tools.trial.outing import Outing, draw_outing, with_amplitude
-from tools.trial.sizing import (
-    Yardstick,
-    is_ordinary,
-    linear_misfit,
-    misfit_beside,
-    yardstick,
-)
 from tools.trial.usual import draw_usual
 from tools.trial.vehicle import draw_vehicle, log_uniform
+from tools.trial.visibility import Yardstick, is_ordinary, linear_misfit, misfit_beside, yardstick
 from tools.trial.voyage import Voyage, sail
 
 STRENGTHS = (0.01, 1.0)
@@ -86,7 +80,7 @@ def _attempt(rng: np.random.Generator, number: int, card: Card, has_usual: bool)
         return None
     hidden: tuple[Hidden, ...] = ()
     for name in card.names:
-        effect = _sized(rng, draw_hidden(rng, name, setting), outing, seed, setting, noise)
+        effect = _strong_enough(rng, draw_hidden(rng, name, setting), outing, seed, setting, noise)
         if effect is None:
             return None
         hidden = (*hidden, effect)
@@ -133,7 +127,7 @@ def _sized_to_pitch(
     return outing, voyage
 
 
-def _sized(
+def _strong_enough(
     rng: np.random.Generator, effect: Hidden, outing: Outing, seed: int, setting: Setting, noise: Yardstick
 ) -> Hidden | None:
     """At a drawn strength; None where it cannot be seen, or tears the vehicle out of the water."""
