@@ -13,12 +13,12 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import Leftover, leftover
 from host.diagnosis.locate import Location, locate
+from host.diagnosis.plane_between_rows import is_likelier, ways
 from host.diagnosis.pruning import leanest
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.sea_fits import with_sea
 from host.diagnosis.search import Search
 from host.diagnosis.seas import WAVES, Waves, among_waves, in_a_sea
-from host.diagnosis.smooth_speed import with_smooth_speed
 from host.diagnosis.spans import Spans, divide, excerpt
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.unknown_physics import known_in, unknown_in, with_unknown
@@ -83,17 +83,34 @@ class Explained(NamedTuple):
     waves: Waves | None
 
 
+class Judged(NamedTuple):
+    """What the held-out spans say of the base and of the model, what is named, where, and the verdict."""
+
+    before: Misfit
+    after: Misfit
+    effects: list[NamedEffect]
+    verdict: Verdict
+    slots: dict[Slot, float]
+
+
 def diagnose(
     recordings: list[Recording], on_progress: Callable[[str], None] = lambda _: None, jobs: int = 1
 ) -> Diagnosis:
     """Finds what the paper's equations lack on these recordings of one vehicle, on `jobs` cores.
 
-    Spikes and the noise of the measured speed are left out first: they are no physics.
+    Spikes are left out first, and it is asked what the plane did between rows: that is no physics.
     """
-    recordings = [with_smooth_speed(recording) for recording in without_outliers(recordings)]
+    on_progress("base model")
+    first, *others = ways(without_outliers(recordings))
+    return _diagnosed(first, others, on_progress, jobs)
+
+
+def _diagnosed(
+    recordings: list[Recording], others: list[list[Recording]], on_progress: Callable[[str], None], jobs: int
+) -> Diagnosis:
+    """The diagnosis with the plane taken so, unless what is found speaks for another way."""
     floor = noise_floor(recordings)
     spans = divide(recordings)
-    on_progress("base model")
     part, teaching = None, excerpt(spans.teaching)
     if teaching is not spans.teaching:
         on_progress("an excerpt")
@@ -103,43 +120,56 @@ def diagnose(
         on_progress("the whole")
     fitter = Fitter(spans.teaching)
     with Workers(fitter, jobs) as workers:
-        best, search, left, waves = _explain(fitter, workers, on_progress, part)
-        model = best if waves is None else waves.model
-        on_progress("held-out check")
-        before, after = misfit(search.base, spans, floor), misfit(model, spans, floor)
-        effects = _named(search, best, spans, floor, after)
-        if waves is not None and WAVES not in best.names:
-            effects.append(NamedEffect(name=WAVES, delta_bic=waves.delta_bic))
-        effects.sort(key=lambda effect: -effect.delta_bic)
-        verdict = verdict_on(model, left, before, after)
-        slots = _slots(search, best, effects, verdict)
+        explained = _explain(fitter, workers, on_progress, part)
+        again = next((way for way in others if is_likelier(way, explained.best)), None)
+        judged = _judge(explained, spans, floor, on_progress) if again is None else None
+    if judged is None:
+        on_progress("the plane between rows")
+        return _diagnosed(again or recordings, [], on_progress, jobs)
+    best, search, left, waves = explained
+    model = best if waves is None else waves.model
     has_sea = best.fit.has_process_noise
     on_progress("final fit on everything")
     base, extended = _refitted(search.base, recordings), _refitted(model, recordings)
     longest = max(recordings, key=lambda recording: recording.duration)
     std = deviations(extended, longest)
     values = dict(zip(extended.fit.structure.names, extended.fit.parameters.tolist(), strict=True))
-    effects = [_with_coefficients(effect, values, std) for effect in effects]
+    effects = [_with_coefficients(effect, values, std) for effect in judged.effects]
     errors = free_run_errors(base, longest)
+    told = remaining(judged.verdict, model, left, judged.after)
     return Diagnosis(
-        verdict=verdict,
+        verdict=judged.verdict,
         recordings=recordings,
         floor=floor,
         base=base,
         extended=extended,
-        base_misfit=before,
-        extended_misfit=after,
+        base_misfit=judged.before,
+        extended_misfit=judged.after,
         is_held_out=bool(spans.judging),
         effects=effects,
-        slots=slots,
+        slots=judged.slots,
         location=locate(longest, errors, floor, values["u0"]),
         force=unknown_force(longest, {n: values[n] for n in NAMES}, floor, fitter.accelerations),
         ranking=_ranking(search),
-        remaining=" ".join([remaining(verdict, model, left, after), *_other_answers(extended)]),
+        remaining=" ".join([told, *_other_answers(extended)]),
         has_sea=has_sea,
         bic=best.bic,
         std=std,
     )
+
+
+def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callable[[str], None]) -> Judged:
+    """Scores on held-out spans; what each effect is worth, and the slots."""
+    best, search, left, waves = explained
+    model = best if waves is None else waves.model
+    on_progress("held-out check")
+    before, after = misfit(search.base, spans, floor), misfit(model, spans, floor)
+    effects = _named(search, best, spans, floor, after)
+    if waves is not None and WAVES not in best.names:
+        effects.append(NamedEffect(name=WAVES, delta_bic=waves.delta_bic))
+    effects.sort(key=lambda effect: -effect.delta_bic)
+    verdict = verdict_on(model, left, before, after)
+    return Judged(before, after, effects, verdict, _slots(search, best, effects, verdict))
 
 
 def _explain(

@@ -1,0 +1,86 @@
+"""Whether a plane held its angles between the rows of a recording, or moved on."""
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import pytest
+from hidden_dive import BASE, hidden_dive
+from scipy.integrate import solve_ivp
+
+from host.diagnosis.diagnose import diagnose
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.plane_between_rows import NOTE, is_likelier, ways, with_moving_plane
+from host.diagnosis.spans import divide
+from host.recording import Array, Recording
+
+STEP = 0.1  # s
+Way = Literal["held", "moving"]
+
+
+def plane(time: float | Array) -> Array:
+    return np.asarray(0.12 * np.sin(1.7 * time) + 0.1 * np.sin(0.7 * time + 1.0))
+
+
+def dive(way: Way) -> Recording:
+    """The paper's vehicle with a plane that swings, read off every 0.1 s."""
+    rng, time = np.random.default_rng(2), np.arange(600) * STEP
+
+    def rate(t: float, x: Array) -> list[float]:
+        w, q, theta, _ = x
+        angle = plane(t if way == "moving" else STEP * np.floor(t / STEP + 1e-9))
+        return [
+            BASE["a1"] * w + BASE["b1"] * angle,
+            BASE["a2"] * q + BASE["a3"] * theta + BASE["b2"] * angle,
+            q,
+            w - BASE["u0"] * theta,
+        ]
+
+    start = [0.0, 0.0, 0.0, 20.0]
+    states = solve_ivp(rate, (0.0, time[-1]), start, t_eval=time, rtol=1e-7, atol=1e-9, max_step=STEP / 2).y
+    nan = np.full(time.size, np.nan)
+    return replace(
+        hidden_dive(duration=1.0),
+        time=time,
+        pitch=states[2] + np.deg2rad(0.05) * rng.standard_normal(time.size),
+        depth=states[3] + 0.005 * rng.standard_normal(time.size),
+        rudder=plane(time),
+        speed=nan,
+        pitch_rate=nan,
+        step=STEP,
+    )
+
+
+def test_a_plane_that_moves_on_is_taken_at_its_mean_and_a_step_stays_a_step() -> None:
+    swinging = dive("moving")
+    mean = np.array([plane(np.linspace(t, t + STEP, 21)).mean() for t in swinging.time])
+    held, moving = (
+        np.sqrt(np.mean((each.rudder - mean)[2:-3] ** 2)) for each in (swinging, with_moving_plane(swinging))
+    )
+    assert moving < 0.1 * held
+    stepped = hidden_dive(seed=1)
+    assert np.array_equal(with_moving_plane(stepped).rudder, stepped.rudder)
+    assert ways([stepped]) == [[stepped]]
+
+
+@pytest.mark.parametrize("way", ["held", "moving"])
+def test_what_the_plane_did_is_read_off_the_motion(way: Way) -> None:
+    recording = dive(way)
+    first, second = ways([recording])
+    assert (NOTE in first[0].notes) == (way == "moving")
+    best, worse = (Fitter(divide(each).teaching).base for each in (first, second))
+    assert is_likelier(first, worse)
+    assert not is_likelier(second, best)
+
+
+def test_a_moving_plane_is_not_taken_for_physics() -> None:
+    found = diagnose([dive("moving")])
+    assert found.verdict == "no_mismatch"
+    assert NOTE in found.recordings[0].notes
+
+
+def test_what_is_found_may_speak_against_the_first_choice(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("host.diagnosis.diagnose.ways", lambda recordings: ways(recordings)[::-1])
+    found = diagnose([dive("moving")])
+    assert found.verdict == "no_mismatch"
+    assert NOTE in found.recordings[0].notes
