@@ -7,7 +7,7 @@ import numpy as np
 from hidden_dive import hidden_dive
 
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.leftover import leftover
+from host.diagnosis.leftover import is_above_floor, leftover
 
 
 def test_the_right_model_leaves_nothing_where_all_readings_are_rounded() -> None:
@@ -19,3 +19,10 @@ def test_the_right_model_leaves_nothing_where_all_readings_are_rounded() -> None
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert leftover(fitter, fitter.base).is_nothing
+
+
+def test_more_than_the_sensors_show_is_told_of_a_set_that_keeps_no_innovations() -> None:
+    fitter = Fitter([hidden_dive(duration=40.0)])
+    lean = fitter.base.lean().fit
+    assert not is_above_floor(fitter, lean)
+    assert is_above_floor(fitter, replace(lean, noise=2.0 * lean.noise))
