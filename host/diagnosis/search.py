@@ -206,8 +206,8 @@ class Search:
         (best,) = self.across([best])
         for _ in range(MOST_ROUNDS):
             best = pruned(self, best)
-            if self.part is not None and len(best.names) > LARGEST_SET:
-                break  # exchanged there
+            if len(best.names) > LARGEST_SET and (self.part is not None or self.is_hopeless(best)):
+                break  # exchanged there, or not worth the time
             rival = exchanged(self, best)
             if rival is best:
                 break
@@ -215,6 +215,10 @@ class Search:
             if len(best.names) > SMALL:
                 break
         return best
+
+    def is_hopeless(self, best: Explanation) -> bool:
+        """Whether much is left although all that every vehicle has was tried at once."""
+        return bool(self.joint) and self.fitter.excess(best.fit) > MUCH
 
     def _retrimmed(self) -> Explanation:
         """The leading sets with the free trim explained by as few of the offsets as will do."""

@@ -23,7 +23,7 @@ MOST_TOLD = 3  # coefficients that a sentence can hold
 def with_unknown(search: Search, best: Explanation) -> Explanation:
     """The best explanation with forms of unknown physics in it, or more effects, if these pay."""
     search.on_progress("physics outside the catalogue")
-    for _ in range(1 if search.part is not None and _is_large(best) else MOST_ROUNDS):
+    for _ in range(_rounds(search, best)):
         grown = _grown(search, best)
         # Of a large set each member costs a long fit to try without: that waits until all have joined.
         leaner = grown if _is_large(best) else (pruned(search, e) for e in grown)
@@ -34,7 +34,18 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
     if not _is_large(best):
         return best
     best = pruned(search, best)
-    return best if search.part is not None else exchanged(search, completed(search, best))
+    if search.part is not None or search.is_hopeless(best):
+        return best
+    return exchanged(search, completed(search, best))
+
+
+def _rounds(search: Search, best: Explanation) -> int:
+    """How often something more may join; a large set that leaves much cannot be named, only described."""
+    if not _is_large(best):
+        return MOST_ROUNDS
+    if search.part is not None:
+        return 1
+    return FEW if search.is_hopeless(best) else MOST_ROUNDS
 
 
 def unknown_in(explanation: Explanation) -> list[str]:
