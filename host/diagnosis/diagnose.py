@@ -122,10 +122,11 @@ def _diagnosed(
     with Workers(fitter, jobs) as workers:
         explained = _explain(fitter, workers, on_progress, part)
         again = next((way for way in others if is_likelier(way, explained.best)), None)
-        judged = _judge(explained, spans, floor, on_progress) if again is None else None
-    if judged is None:
+        if again is None:
+            judged = _judge(explained, spans, floor, on_progress)
+    if again is not None:
         on_progress("the plane between rows")
-        return _diagnosed(again or recordings, [], on_progress, jobs)
+        return _diagnosed(again, [], on_progress, jobs)
     best, search, left, waves = explained
     model = best if waves is None else waves.model
     has_sea = best.fit.has_process_noise
