@@ -46,10 +46,12 @@ def filter_error(start: Fit, inputs: list[Inputs], most_steps: int = 40) -> Fit:
     return filter_error_from(point, inputs, start.free, most_steps)
 
 
-def filter_error_from(point: Point, inputs: list[Inputs], free: Mask, most_steps: int = 40) -> Fit:
-    """The same from any point with forces."""
+def filter_error_from(
+    point: Point, inputs: list[Inputs], free: Mask, most_steps: int = 40, holds_noise: bool = False
+) -> Fit:
+    """The same from any point with forces; or the parameters alone, under these very forces."""
     model = RandomForces(inputs)
-    end, used, converged = ascend(point, model, free, most_steps)
+    end, used, converged = ascend(point, model, free, most_steps, holds_noise)
     if not np.isfinite(end.likelihood):
         return run_away(point, inputs, free)
     white = model.whitened(end.point, end.passes)

@@ -285,7 +285,7 @@ class Fitter:
         names = frozenset(effect.name for effect in structure.effects)
         inputs, free = self.inputs(names), self.free(names)
         if starts[0].noise[2:].any():
-            return self.carried_on(starts[0])
+            return self._under_forces(starts[0], holds_noise=True)
         fits = [output_error(start, inputs, free, first, TOLERANCE) for start in starts]
         best = max(fits, key=lambda fit: fit.log_likelihood)
         if best.log_likelihood < least:
@@ -295,14 +295,21 @@ class Fitter:
 
     def carried_on(self, start: Point, tolerance: float = SETTLED) -> Fit:
         """A fit from this point to its end, under random forces or waves where the point has them."""
+        if start.noise[2:].any():
+            return self._under_forces(start, holds_noise=False)
         names = frozenset(effect.name for effect in start.structure.effects)
-        free, has_forces = self.free(names), bool(start.noise[2:].any())
-        inputs = self.inputs(names, for_filter=has_forces)
+        return output_error(start, self.inputs(names), self.free(names), tolerance=tolerance)
+
+    def _under_forces(self, start: Point, holds_noise: bool) -> Fit:
+        """While sets are compared, forces stay as they were first found, and waves to the end.
+
+        Their levels take most of the time, and a set that is better than another is so at any of them.
+        """
+        names = frozenset(effect.name for effect in start.structure.effects)
+        inputs, free = self.inputs(names, for_filter=True), self.free(names)
         if start.noise.size > 4:
             return wave_forces_from(start, inputs, free, holds_noise=True)
-        if has_forces:
-            return filter_error_from(start, inputs, free)
-        return output_error(start, inputs, free, tolerance=tolerance)
+        return filter_error_from(start, inputs, free, holds_noise=holds_noise)
 
 
 def hopeless(rival: Fit) -> float:
