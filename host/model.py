@@ -27,6 +27,7 @@ class VehicleModel:
                  correlation time of that part, "depth_wander_m", "depth_wander_s"
     valid_range  smallest and largest "pitch_rad", "rudder_rad", "depth_m", "speed_mps" the data held
     provenance   recording names with sha256, program version, method
+    has_moving_plane  whether the plane is taken to move on evenly between the rows of a recording
     """
 
     vehicle: str
@@ -37,6 +38,7 @@ class VehicleModel:
     valid_range: dict[str, tuple[float, float]]
     provenance: dict[str, Any]
     effects: list[dict[str, Any]] = field(default_factory=list)
+    has_moving_plane: bool = False
 
     @property
     def units(self) -> dict[str, str]:
@@ -96,6 +98,7 @@ def model_of(
             "recordings": [{"name": name, "sha256": digest} for name, digest in files.items()],
         },
         effects=effects if effects is not None else [],
+        has_moving_plane=any(recording.has_moving_plane for recording in recordings),
     )
 
 
@@ -110,6 +113,7 @@ def write_model(model: VehicleModel, path: Path) -> None:
             for name in NAMES
         },
         "effects": model.effects,
+        "plane_between_rows": "moving" if model.has_moving_plane else "held",
         "noise": model.noise,
         "valid_range": {name: list(limits) for name, limits in model.valid_range.items()},
         "provenance": model.provenance,
@@ -150,6 +154,9 @@ def read_model(path: Path) -> VehicleModel:
     effects = document.get("effects") or []
     for effect in effects:
         _check_effect(effect, path)
+    plane = document.get("plane_between_rows", "held")
+    if plane not in ("held", "moving"):
+        raise RecordingError(f"{path}: plane_between_rows must be 'held' or 'moving' (got {plane!r})")
     values, std = {}, {}
     for name in NAMES:
         entry = document.get("parameters", {}).get(name)
@@ -176,6 +183,7 @@ def read_model(path: Path) -> VehicleModel:
             },
             provenance=dict(document.get("provenance", {})),
             effects=effects,
+            has_moving_plane=plane == "moving",
         )
     except (KeyError, TypeError, ValueError) as error:
         raise RecordingError(f"{path}: is not a complete model file ({error})") from error

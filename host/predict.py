@@ -7,6 +7,7 @@ import numpy as np
 from host.errors import RecordingError
 from host.model import VehicleModel
 from host.outliers import without_outliers
+from host.plane_between_rows import with_moving_plane
 from host.propagate import Inputs, free_run, inputs_of
 from host.recording import Array, Recording
 from host.sensitivities import innovations
@@ -49,7 +50,8 @@ def predict(model: VehicleModel, recording: Recording) -> Prediction:
 
     A spike among these is not learnt from; the score is against the values as they were measured.
     """
-    (cleaned,) = without_outliers([recording])
+    driven = with_moving_plane(recording) if model.has_moving_plane else recording
+    (cleaned,) = without_outliers([driven])
     inputs = inputs_of(cleaned, model.structure)
     opening = cleaned.between(recording.time[0], recording.time[0] + SETTLING_SPAN)
     if opening.time.size < 4:

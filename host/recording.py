@@ -24,6 +24,7 @@ class Recording:
     pitch_rate  rad/s; all NaN where it is not recorded
     step        s, nominal interval
     has_angle   whether rudder is an angle in rad; False for another actuator in a unit of its own
+    has_moving_plane  whether rudder holds the means of a plane that moved on to the next row's angle
     counts      what was refused in the whole file, by cause
     notes       what was lost or decided on the user's behalf, one sentence each
     alarms      s, on the axis of time: when the vehicle was found to move no longer as it did
@@ -39,6 +40,7 @@ class Recording:
     pitch_rate: Array
     step: float
     has_angle: bool = True
+    has_moving_plane: bool = False
     counts: Counter[str] = field(default_factory=Counter)
     notes: tuple[str, ...] = ()
     alarms: tuple[float, ...] = ()

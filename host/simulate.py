@@ -8,6 +8,7 @@ import numpy as np
 
 from host.model import VehicleModel
 from host.outliers import without_outliers
+from host.plane_between_rows import with_moving_plane
 from host.predict import SETTLING_SPAN, estimate_initial_state
 from host.propagate import Run, free_run, inputs_of
 from host.recording import Array, Recording
@@ -30,7 +31,8 @@ def simulate(model: VehicleModel, recording: Recording) -> Simulation:
 
     It starts where the first 5 s of depth and pitch say; at rest at depth 0 where these are not recorded.
     """
-    (cleaned,) = without_outliers([recording])
+    driven = with_moving_plane(recording) if model.has_moving_plane else recording
+    (cleaned,) = without_outliers([driven])
     inputs = inputs_of(cleaned, model.structure)
     opening = cleaned.between(recording.time[0], recording.time[0] + SETTLING_SPAN)
     if np.isfinite(opening.depth).any() and np.isfinite(opening.pitch).any():

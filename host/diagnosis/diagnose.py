@@ -13,7 +13,7 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import Leftover, leftover
 from host.diagnosis.locate import Location, locate
-from host.diagnosis.plane_between_rows import is_likelier, ways
+from host.diagnosis.plane_choice import is_likelier, ways
 from host.diagnosis.pruning import leanest
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.sea_fits import with_sea

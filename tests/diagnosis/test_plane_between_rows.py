@@ -1,6 +1,8 @@
 """Whether a plane held its angles between the rows of a recording, or moved on."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -9,10 +11,18 @@ from hidden_dive import BASE, hidden_dive
 from scipy.integrate import solve_ivp
 
 from host.diagnosis.diagnose import diagnose
+from host.diagnosis.files import write_extended_model
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.plane_between_rows import NOTE, is_likelier, ways, with_moving_plane
+from host.diagnosis.plane_choice import is_likelier, ways
 from host.diagnosis.spans import divide
+from host.equations import NAMES
+from host.errors import RecordingError
+from host.model import model_of, read_model, write_model
+from host.plane_between_rows import NOTE, with_moving_plane
+from host.predict import predict
 from host.recording import Array, Recording
+from host.simulate import simulate
+from host.vehicle import default_vehicle
 
 STEP = 0.1  # s
 Way = Literal["held", "moving"]
@@ -73,10 +83,31 @@ def test_what_the_plane_did_is_read_off_the_motion(way: Way) -> None:
     assert not is_likelier(second, best)
 
 
-def test_a_moving_plane_is_not_taken_for_physics() -> None:
-    found = diagnose([dive("moving")])
+def test_a_moving_plane_is_not_taken_for_physics_and_the_model_moves_it_again(tmp_path: Path) -> None:
+    recording = dive("moving")
+    found = diagnose([recording])
     assert found.verdict == "no_mismatch"
     assert NOTE in found.recordings[0].notes
+    write_extended_model(found, default_vehicle(), path := tmp_path / "extended_model.json")
+    model = read_model(path)
+    assert model.has_moving_plane
+    moved, held = (predict(replace(model, has_moving_plane=flag), recording).score for flag in (True, False))
+    assert moved.pitch_rmse_rad < 0.8 * held.pitch_rmse_rad
+    assert np.array_equal(simulate(model, recording).rudder, recording.rudder)
+
+
+def test_a_model_file_says_what_the_plane_does_or_the_plane_is_held(tmp_path: Path) -> None:
+    found = Fitter([hidden_dive(duration=20.0)])
+    values = dict(zip(NAMES, found.base.fit.parameters[: len(NAMES)].tolist(), strict=True))
+    write_model(model_of(found.recordings, "v", "ml", values, dict.fromkeys(NAMES, 0.0)), tmp_path / "m.json")
+    document = json.loads((tmp_path / "m.json").read_text())
+    assert document["plane_between_rows"] == "held"
+    del document["plane_between_rows"]
+    (tmp_path / "m.json").write_text(json.dumps(document))
+    assert not read_model(tmp_path / "m.json").has_moving_plane
+    (tmp_path / "m.json").write_text(json.dumps(document | {"plane_between_rows": "flying"}))
+    with pytest.raises(RecordingError, match="must be 'held' or 'moving'"):
+        read_model(tmp_path / "m.json")
 
 
 def test_what_is_found_may_speak_against_the_first_choice(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,10 +13,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.margins import NAMING_MARGIN
-from host.diagnosis.spans import divide, excerpt
 from host.recording import Recording
 
 NOTE = "the plane is taken to move evenly from row to row: the recording follows that better than angles held"
@@ -25,31 +21,10 @@ NOTE = "the plane is taken to move evenly from row to row: the recording follows
 def with_moving_plane(recording: Recording) -> Recording:
     """The recording with the mean angles of a plane that moves on evenly."""
     slopes = np.diff(recording.rudder) / np.diff(recording.time)
-    if slopes.size < 3:
+    if recording.has_moving_plane or slopes.size < 3:
         return recording
     beside = np.maximum(np.abs(slopes[:-2]), np.abs(slopes[2:]))
     slope = np.zeros_like(recording.rudder)
     slope[1:-2] = np.clip(slopes[1:-1], -2.0 * beside, 2.0 * beside)
     rudder = recording.rudder + 0.5 * recording.intervals * slope
-    return replace(recording, rudder=rudder, notes=(*recording.notes, NOTE))
-
-
-def ways(recordings: list[Recording]) -> list[list[Recording]]:
-    """The recordings with a plane that held its angles and with one that moved, the likelier first.
-
-    As the base equations see them: what is left out may favour the other.
-    """
-    moving = [with_moving_plane(recording) for recording in recordings]
-    if all(np.array_equal(a.rudder, b.rudder) for a, b in zip(recordings, moving, strict=True)):
-        return [recordings]
-    return sorted((recordings, moving), key=lambda way: Fitter(_excerpt(way)).base.bic)
-
-
-def is_likelier(other: list[Recording], best: Explanation) -> bool:
-    """Whether an explanation fits the recordings clearly better with the plane the other way."""
-    again = Fitter(divide(other).teaching, known=best).polished(best)
-    return again.bic < best.bic - NAMING_MARGIN
-
-
-def _excerpt(recordings: list[Recording]) -> list[Recording]:
-    return excerpt(divide(recordings).teaching)
+    return replace(recording, rudder=rudder, has_moving_plane=True, notes=(*recording.notes, NOTE))
