@@ -114,6 +114,9 @@ def _probes(fitter: "Fitter", effect: Effect, parent: Explanation) -> list[Array
         ]
     if effect.name in SCANS:
         probes = [np.array([*probes[0][:-1], moment]) for moment in _moments(fitter, effect.name, parent)]
+    if effect.force is not None and len(effect.size_names) == len(effect.parameters):
+        # Linear in its sizes, a force is foretold best from none; far off, readings in steps mislead.
+        probes.append(np.zeros(len(effect.parameters)))
     return probes
 
 

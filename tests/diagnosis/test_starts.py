@@ -36,6 +36,15 @@ def test_a_change_too_small_to_be_seen_from_another_moment_is_found() -> None:
     assert found.bic < fitter.base.bic - 20.0
 
 
+def test_a_force_is_also_foretold_from_none_of_it() -> None:
+    fitter = Fitter([hidden_dive(duration=40.0)])
+    starts = [values.tolist() for _, values in probed(fitter, fitter.base, named("heave_quadratic_drag"), [])]
+    assert [0.0] in starts
+    assert [-1.0] in starts
+    lagging = [v.tolist() for _, v in probed(fitter, fitter.base, named("actuator_lag"), [])]
+    assert [0.0] not in lagging
+
+
 def test_a_moment_stays_where_it_was_while_another_stretch_is_settled() -> None:
     def weaker(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
         lost = -0.004 * plane * (time > 60.0)
