@@ -73,7 +73,7 @@ def is_even(innovations: Array) -> bool:
         known = np.isfinite(values)
         if known.sum() < 100 or np.ptp(values[known]) == 0.0:
             continue
-        _, power = periodogram(np.where(known, values - values[known].mean(), 0.0))
+        _, power = periodogram(_centred(values))
         cumulated = np.cumsum(power[1:]) / power[1:].sum()
         even = np.arange(1, cumulated.size + 1) / cumulated.size
         spread = np.sqrt(max(1.0, clustering(values)) / cumulated.size)
@@ -87,11 +87,11 @@ def clustering(values: Array, lags: int = 20) -> float:
 
     N sum_t e_t^2 e_(t+k)^2 / (sum_t e_t^2)^2, the mean over k = 1..lags; 1 where all variances are equal.
     """
-    centred = _centred(values)
-    pairs = _lagged_sums(np.isfinite(values).astype(float), lags)[1:]
-    scatter = _lagged_sums(centred**2, lags)[1:]
-    variance = float(np.nanmean(centred[np.isfinite(values)] ** 2))
-    return float(np.mean(scatter / np.maximum(pairs, 1.0))) / variance**2
+    present = np.isfinite(values)
+    squares = _centred(values) ** 2
+    pairs = _lagged_sums(present.astype(float), lags)[1:]
+    scatter = _lagged_sums(squares, lags)[1:] / np.maximum(pairs, 1.0)
+    return float(np.mean(scatter) / squares[present].mean() ** 2)
 
 
 def correlation_factor(innovations: list[Array], lags: int = 100) -> float:

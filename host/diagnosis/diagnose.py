@@ -13,7 +13,7 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import Leftover, leftover
 from host.diagnosis.locate import Location, locate
-from host.diagnosis.plane_choice import is_likelier, ways
+from host.diagnosis.plane_choice import Way, is_likelier, ways
 from host.diagnosis.pruning import leanest
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.sea_fits import with_sea
@@ -105,23 +105,21 @@ def diagnose(
     return _diagnosed(first, others, on_progress, jobs)
 
 
-def _diagnosed(
-    recordings: list[Recording], others: list[list[Recording]], on_progress: Callable[[str], None], jobs: int
-) -> Diagnosis:
+def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], jobs: int) -> Diagnosis:
     """The diagnosis with the plane taken so, unless what is found speaks for another way."""
+    recordings, fitter = way
     floor = noise_floor(recordings)
     spans = divide(recordings)
-    part, teaching = None, excerpt(spans.teaching)
-    if teaching is not spans.teaching:
+    part = None
+    if excerpt(spans.teaching) is not spans.teaching:
         on_progress("an excerpt")
-        fitter = Fitter(teaching)
         with Workers(fitter, jobs) as workers:
             part = _explain(fitter, workers, on_progress)
         on_progress("the whole")
-    fitter = Fitter(spans.teaching)
+        fitter = Fitter(spans.teaching)
     with Workers(fitter, jobs) as workers:
         explained = _explain(fitter, workers, on_progress, part)
-        again = next((way for way in others if is_likelier(way, explained.best)), None)
+        again = next((other for other in others if is_likelier(other, explained.best)), None)
         if again is None:
             judged = _judge(explained, spans, floor, on_progress)
     if again is not None:

@@ -1,5 +1,7 @@
 """Whether a plane held its angles between rows or moved on (host.plane_between_rows): asked of the motion."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from host.diagnosis.explanation import Explanation
@@ -10,22 +12,26 @@ from host.plane_between_rows import with_moving_plane
 from host.recording import Recording
 
 
-def ways(recordings: list[Recording]) -> list[list[Recording]]:
+class Way(NamedTuple):
+    """The recordings with the plane taken one way, and the base fitted to what a search begins with."""
+
+    recordings: list[Recording]
+    fitter: Fitter
+
+
+def ways(recordings: list[Recording]) -> list[Way]:
     """The recordings with a plane that held its angles and with one that moved, the likelier first.
 
     As the base equations see them: what is left out may favour the other.
     """
     moving = [with_moving_plane(recording) for recording in recordings]
-    if all(np.array_equal(a.rudder, b.rudder) for a, b in zip(recordings, moving, strict=True)):
-        return [recordings]
-    return sorted((recordings, moving), key=lambda way: Fitter(_excerpt(way)).base.bic)
+    is_same = all(np.array_equal(a.rudder, b.rudder) for a, b in zip(recordings, moving, strict=True))
+    tried = [recordings] if is_same else [recordings, moving]
+    fitted = [Way(each, Fitter(excerpt(divide(each).teaching))) for each in tried]
+    return sorted(fitted, key=lambda way: way.fitter.base.bic)
 
 
-def is_likelier(other: list[Recording], best: Explanation) -> bool:
+def is_likelier(other: Way, best: Explanation) -> bool:
     """Whether an explanation fits the recordings clearly better with the plane the other way."""
-    again = Fitter(divide(other).teaching, known=best).polished(best)
+    again = Fitter(divide(other.recordings).teaching, known=best).polished(best)
     return again.bic < best.bic - NAMING_MARGIN
-
-
-def _excerpt(recordings: list[Recording]) -> list[Recording]:
-    return excerpt(divide(recordings).teaching)
