@@ -22,6 +22,7 @@ from host.propagate import Inputs
 from host.recording import Array
 
 SLOWEST = 0.2  # rad/s; slower is current
+BROADEST = 0.4  # of a sea: 0.26 fits the waves of a fully developed one, 0.1 those of a young one
 QUICKEST = 4.0  # rad/s, where the search begins at most: in what white forces leave there may be no peak
 FIRST_DAMPING = 0.2
 
@@ -55,7 +56,7 @@ def _swing(channel: str) -> tuple[Effect, Effect]:
 
 SHAPE = (
     Parameter(name="wave_frequency", unit="rad/s", lower=SLOWEST, upper=100.0, meaning="of the waves met"),
-    Parameter(name="wave_damping", unit="", lower=0.02, upper=3.0, meaning="width of their band"),
+    Parameter(name="wave_damping", unit="", lower=0.02, upper=BROADEST, meaning="width of their band"),
 )
 WAVES = (*_swing("heave"), *_swing("pitch"))
 

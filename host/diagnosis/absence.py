@@ -1,7 +1,7 @@
-"""What a set loses without one of its effects, one Gauss-Newton step ahead.
+"""What a set loses without some of its effects, one Gauss-Newton step ahead.
 
-About the maximum the log-likelihood falls by 1/2 d^T M d for the information M. With the sizes s of the
-effect put to zero and its other parameters idle, the rest o follows by -M_oo^-1 M_os s, and the loss is
+About the maximum the log-likelihood falls by 1/2 d^T M d for the information M. With the sizes s of these
+effects put to zero and their other parameters idle, the rest o follows by -M_oo^-1 M_os s, and the loss is
 1/2 s^T (M_ss - M_so M_oo^-1 M_os) s (half of Wald's statistic).
 """
 
@@ -12,16 +12,17 @@ from host.fit import Fit
 from host.recording import Array
 
 
-def one_step_without(fit: Fit, effect: Effect) -> tuple[float, Array] | None:
-    """Twice the log-likelihood lost without the effect, and the whole set's parameters (n,) there.
+def one_step_without(fit: Fit, *effects: Effect) -> tuple[float, Array] | None:
+    """Twice the log-likelihood lost without the effects, and the whole set's parameters (n,) there.
 
-    None where no value of its parameters makes it absent.
+    None where no value of its parameters makes one of them absent.
     """
     names = np.array(fit.structure.names)
-    own = np.isin(names, [parameter.name for parameter in effect.parameters])
-    gone = np.isin(names, effect.size_names) & fit.free
-    if not gone.any():
+    own = np.isin(names, [parameter.name for effect in effects for parameter in effect.parameters])
+    sizes = [np.isin(names, effect.size_names) & fit.free for effect in effects]
+    if not all(size.any() for size in sizes):
         return None
+    gone = np.any(sizes, axis=0)
     others = fit.free & ~own
     M = fit.information
     change = -fit.parameters[gone]

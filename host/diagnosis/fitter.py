@@ -15,7 +15,15 @@ from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations
 from host.diagnosis.prospects import form_gains, gain
 from host.diagnosis.spans import ALARM_LATE
-from host.diagnosis.starts import guess, has_usual_heave, idle, is_far, starts_of, with_usual_heave
+from host.diagnosis.starts import (
+    guess,
+    has_usual_heave,
+    idle,
+    is_far,
+    starts_of,
+    with_usual_heave,
+    with_usual_pitch,
+)
 from host.equations import NAMES, Effect
 from host.filter_error import filter_error_from
 from host.fit import Fit
@@ -158,6 +166,7 @@ class Fitter:
         again = look_alikes(end) if named(name).parameters[0].name in SHARING_POLES else []
         if not has_usual_heave(end):
             again += with_usual_heave(end)
+        again += with_usual_pitch(self, parent, name, values)
         others = [self._fit([start], hopeless(fit), PATIENT_ITERATIONS) for start in again]
         fit = max([fit, *others], key=plausibility)
         if named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
@@ -171,11 +180,11 @@ class Fitter:
     def form_gains(self, parent: Explanation) -> dict[str, float]:
         return form_gains(self, parent)
 
-    def shrunk(self, parent: Explanation, name: str) -> Explanation:
-        """The parent's set without one of its effects; not polished."""
-        names = parent.names - {name}
+    def shrunk(self, parent: Explanation, *members: str) -> Explanation:
+        """The parent's set without some of its effects; not polished."""
+        names = parent.names - {*members}
         start = self.point(names, parent)
-        ahead = one_step_without(parent.fit, named(name))
+        ahead = one_step_without(parent.fit, *map(named, members))
         if ahead is not None and not parent.fit.has_process_noise:
             known = dict(zip(parent.fit.structure.names, ahead[1].tolist(), strict=True))
             moved = replace(start, parameters=np.array([known[own] for own in start.structure.names]))

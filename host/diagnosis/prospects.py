@@ -92,7 +92,7 @@ def _whitened(
     point: Point, inputs: list[Inputs], parent: Explanation
 ) -> tuple[list[tuple[Array, Array]], float]:
     """Innovations and sensitivities under the parent's noise, and the deviance: inf if lost."""
-    with np.errstate(over="ignore", invalid="ignore"):
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if parent.fit.waves.any():
             white = whitened_among_waves(point, inputs)
         elif parent.fit.has_process_noise:
@@ -101,7 +101,7 @@ def _whitened(
             white, deviance = residuals_at(point, inputs)
         if parent.fit.has_process_noise:
             deviance = sum(float(np.sum(e**2)) for e, _ in white)
-        return white, np.inf if diverges(white, inputs) else deviance
+        return white, np.inf if diverges(white, inputs, 1e3) else deviance
 
 
 def _probes(fitter: "Fitter", effect: Effect, parent: Explanation) -> list[Array]:

@@ -1,6 +1,7 @@
 """A set less the members that do not pay for themselves."""
 
 from itertools import combinations
+from math import inf, log
 from typing import TYPE_CHECKING
 
 from host.catalogue import named
@@ -11,12 +12,16 @@ from host.diagnosis.margins import LARGEST_SET, ROUGH, SMALL, margin
 if TYPE_CHECKING:
     from host.diagnosis.search import Search
 
+IDLE = 4.0  # of BIC, that leaving out a member must promise: about half of what one coefficient is charged
 CLEARLY = 20.0  # times the margin: no doubt is left that a member is needed
 
 
 def pruned(search: "Search", explanation: Explanation) -> Explanation:
     """The set less the members that do not pay for themselves, alone or two together."""
-    given, doubtful = explanation, _doubtful(explanation)
+    given = explanation
+    if len(explanation.names) > LARGEST_SET:
+        explanation = _without_the_idle(search, explanation)
+    doubtful = _doubtful(explanation)
     while doubtful:
         smaller = {explanation.names - {member}: member for member in sorted(doubtful)}
         limit = explanation.bic + margin(explanation)
@@ -55,6 +60,33 @@ def _without_two(search: "Search", explanation: Explanation, doubtful: list[str]
         search.shrink(search.tried[explanation.names - {one}], [names])
     search.polish([names for names in pairs if search.tried[names].bic < explanation.bic + ROUGH])
     return min((search.tried[names] for names in pairs), key=lambda e: e.bic)
+
+
+def _without_the_idle(search: "Search", explanation: Explanation) -> Explanation:
+    """A large set less those that, by its own fit, are idle together; less fewer, where a fit says no."""
+    idle: list[str] = []
+    saved = [0.0]  # of BIC, by how many go
+    while rest := explanation.names - {*idle}:
+        foretold = {name: _saved(search, explanation, [*idle, name]) for name in sorted(rest)}
+        best = max(foretold, key=lambda name: foretold[name])
+        if foretold[best] < saved[-1] + IDLE:
+            break
+        idle.append(best)
+        saved.append(foretold[best])
+    while len(idle) > 1:
+        smaller = search.without_all(explanation, idle)
+        if smaller.bic < explanation.bic - saved[len(idle)] + margin(explanation):
+            return smaller
+        del idle[len(idle) // 2 :]  # those that came last are the least idle
+    return explanation
+
+
+def _saved(search: "Search", explanation: Explanation, members: list[str]) -> float:
+    """What the BIC falls by without these members, one step ahead; -inf where one cannot be absent."""
+    ahead = one_step_without(explanation.fit, *map(named, members))
+    if ahead is None:
+        return -inf
+    return log(explanation.fit.samples) * search.fitter.free_parameters(frozenset(members)) - ahead[0]
 
 
 def _doubtful(explanation: Explanation) -> set[str]:

@@ -90,6 +90,12 @@ class Search:
         self.polish([names for names in sets if names in self._shrunk and self.tried[names].bic < limit])
         return [self.tried[names] for names in sets]
 
+    def without_all(self, best: Explanation, members: list[str]) -> Explanation:
+        """The set less all of these members at once, fitted to the end."""
+        (found,) = self.workers.results([("shrunk", (best, *members))])
+        self.polish([self.remember(found).names])
+        return self.tried[found.names]
+
     def gain_alone(self, name: str) -> float:
         """What the effect alone takes off the BIC: of the root, of the base if an offset; -inf if untried."""
         if self.part is not None:

@@ -11,6 +11,7 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.margins import NAMING_MARGIN
 from host.diagnosis.sea_fits import as_filtered, with_regular_waves, with_sea, with_waves
 from host.diagnosis.search import Search
+from host.wave_forces import BROADEST
 
 WAVES = "surface_waves"
 
@@ -70,7 +71,8 @@ def among_waves(
     first = min((with_waves(fitter, one) for one in (white, *beside)), key=lambda e: e.bic)
     period = 2.0 * np.pi / first.fit.waves[0]
     least = as_filtered(fitter, best).bic
-    if first.bic > least - NAMING_MARGIN or not WAVE_PERIODS[0] < period < WAVE_PERIODS[1]:
+    is_sea = WAVE_PERIODS[0] < period < WAVE_PERIODS[1] and first.fit.waves[1] < BROADEST
+    if first.bic > least - NAMING_MARGIN or not is_sea:
         return rough, best, None
     base, root = (with_waves(fitter, one, first.fit) for one in (rough.base, rough.root))
     search = Search(fitter, rough.workers, rough.on_progress, base, root, rough.part)

@@ -15,11 +15,10 @@ from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import first_guess
 from host.diagnosis.margins import LARGEST_SET
 from host.diagnosis.prospects import probed
-from host.equations import NAMES
 from host.gauss_newton import Point
 from host.output_error import annealed
 from host.recording import Array
-from host.valleys import USUAL_DAMPING, USUAL_LEVER
+from host.valleys import A1, A2, A3, B1, B2, USUAL_DAMPING, USUAL_LEVER
 
 if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
@@ -28,7 +27,7 @@ FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley
 FEW = 1  # members of a set, the free trim among them, that lacks the most
 # 1/s, of a1: a base that lacks an effect may follow its plane at once, or hardly at all.
 INSTANT, IDLE = -10.0, -0.1
-A1, B1, B2 = (NAMES.index(name) for name in ("a1", "b1", "b2"))
+SLUGGISH, USUAL_PITCH_DAMPING = -0.3, -3.0  # 1/s, of a2: a base that lacks a slow plane is a slow hull
 
 
 def starts_of(
@@ -94,6 +93,24 @@ def with_usual_heave(start: Point) -> list[Point]:
         parameters = start.parameters.copy()
         parameters[[A1, B1]] = USUAL_DAMPING, force
         starts.append(replace(start, parameters=parameters))
+    return starts
+
+
+def with_usual_pitch(fitter: "Fitter", parent: Explanation, name: str, values: list[Array]) -> list[Point]:
+    """Starts of a set with the pitch damping of a usual vehicle, where a bent parent is a sluggish one.
+
+    It turns as much in the end. What a sluggish hull promises of an effect does not choose between probes.
+    """
+    a2 = parent.fit.parameters[A2]
+    if not (may_be_bent(fitter, parent) and a2 > SLUGGISH):
+        return []
+    starts = []
+    for _, probe in probed(fitter, parent, named(name), values):
+        start = fitter.point(parent.names | {name}, parent, name, probe)
+        parameters = start.parameters.copy()
+        parameters[[A2, A3, B2]] *= USUAL_PITCH_DAMPING / a2
+        start = replace(start, parameters=start.structure.clipped(parameters))
+        starts += [start] if has_usual_heave(start) else with_usual_heave(start)[:1]
     return starts
 
 

@@ -50,3 +50,15 @@ def test_waves_are_estimated_beside_what_was_found_without_them(monkeypatch: pyt
             _, found, waves = among_waves(rough, base, known)
             assert waves is not None
             assert found.names == waves.fitted.names == names
+
+
+def test_a_band_broader_than_that_of_any_sea_is_no_waves(monkeypatch: pytest.MonkeyPatch) -> None:
+    rough = in_waves(lambda time, x, plane: (0.0, 0.0, 0.0), 0.01, 0.06)  # noqa: ARG005
+    fitter = Fitter([hidden_dive(rough, duration=90.0)])
+    base, root = with_sea(fitter, fitter.base), with_sea(fitter, fitter.trimmed())
+    monkeypatch.setattr(Search, "run", lambda _, also: min(also, key=lambda e: e.bic))
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, base, root)
+        assert among_waves(search, base, fitter.base)[2] is not None
+        monkeypatch.setattr("host.diagnosis.seas.BROADEST", 0.001)
+        assert among_waves(search, base, fitter.base)[2] is None

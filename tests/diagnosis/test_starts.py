@@ -11,11 +11,11 @@ from host.diagnosis.diagnose import deviations
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.prospects import probed
-from host.diagnosis.starts import with_usual_heave
+from host.diagnosis.starts import SLUGGISH, with_usual_heave, with_usual_pitch
 from host.gauss_newton import Point
 from host.output_error import output_error
 from host.propagate import free_run, inputs_of
-from host.recording import Array
+from host.recording import Array, Recording
 from host.valleys import other_valleys, with_depth_lag_swapped, with_force_mirrored, with_poles_swapped
 
 AT_REST = np.array([0.0, 0.0, 0.0, 20.0])
@@ -220,3 +220,41 @@ def test_an_oscillation_starts_with_the_size_that_suits_its_period() -> None:
     _, (sine, cosine, period) = max(found, key=lambda pair: pair[0])
     assert period == pytest.approx(140.0, rel=0.1)
     assert np.hypot(sine, cosine) == pytest.approx(4e-4, rel=0.3)
+
+
+def rate_limited(rate: float) -> Recording:
+    """A quick hull whose plane creeps from step to step of its command."""
+    structure = structure_of(("actuator_rate_limit",))
+    rng, h = np.random.default_rng(3), 0.2
+    time = np.arange(0.0, 300.0, h)
+    command = np.repeat(rng.choice([-0.027, 0.0, 0.027], 60), 25)
+    plain = hidden_dive(duration=1.0)
+    nan = np.full(time.size, np.nan)
+    dive = replace(plain, time=time, rudder=command, depth=nan, pitch=nan, speed=nan, pitch_rate=nan, step=h)
+    values = [*{**BASE, "a1": -0.5, "a2": -5.6, "a3": -0.24, "b1": -1.2, "b2": -3.8}.values(), 0.0, 0.0, rate]
+    pitch, depth = free_run(np.array(values), AT_REST, inputs_of(dive, structure)).outputs
+    return replace(
+        dive,
+        pitch=np.round((pitch + 1e-3 * rng.standard_normal(time.size)) / 2e-3) * 2e-3,
+        depth=np.round((depth + 0.03 * rng.standard_normal(time.size)) / 0.1) * 0.1,
+    )
+
+
+def test_a_slow_plane_is_found_where_the_base_took_it_for_a_slow_hull(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fitter, name = Fitter([rate_limited(0.0063)]), "actuator_rate_limit"
+    root = fitter.trimmed()
+    assert root.fit.parameters[1] > SLUGGISH
+    # From a plane so quick that its limit makes no difference no fit comes back.
+    quick = fitter.point(root.names | {name}, root, name, np.array([50.0]))
+    monkeypatch.setattr("host.diagnosis.fitter.starts_of", lambda *_: [quick])
+    found = fitter.grown(root, name, [])
+    values = dict(zip(found.fit.structure.names, found.fit.parameters, strict=True))
+    assert values["plane_rate"] == pytest.approx(0.0063, rel=0.03)
+    assert values["a2"] == pytest.approx(-5.6, rel=0.3)
+
+
+def test_a_hull_of_usual_damping_begins_as_it_is() -> None:
+    fitter = Fitter([hidden_dive(duration=40.0)])
+    assert with_usual_pitch(fitter, fitter.trimmed(), "actuator_rate_limit", []) == []

@@ -1,0 +1,58 @@
+"""Of a large set, what is idle goes at once; what pays stays."""
+
+from typing import Any
+
+import pytest
+from hidden_dive import hidden_dive
+
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.pruning import pruned
+from host.diagnosis.search import Search
+from host.diagnosis.together import with_ordinary
+from host.diagnosis.workers import Workers
+from host.recording import Array
+
+TRUE = {"heave_pitch_rate_coupling", "pitch_quadratic_damping"}
+
+
+def coupled(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+    return 0.3 * x[1], -3.0 * x[1] * abs(x[1]), 0.0
+
+
+@pytest.fixture(scope="module")
+def fitter() -> Fitter:
+    return Fitter([hidden_dive(coupled)])
+
+
+def search_of(fitter: Fitter, workers: Workers) -> Search:
+    return Search(fitter, workers, lambda _: None, fitter.base, fitter.base)
+
+
+def test_all_that_are_idle_go_at_once(fitter: Fitter, monkeypatch: pytest.MonkeyPatch) -> None:
+    shrunk: list[tuple[Any, ...]] = []
+    with Workers(fitter, 1) as workers:
+        search = search_of(fitter, workers)
+        joint = with_ordinary(search, fitter.grown(fitter.base, "heave_pitch_rate_coupling", []))
+        assert len(joint.names) > 8
+        results = workers.results
+
+        def noted(tasks: Any, *more: Any) -> list[Any]:
+            shrunk.extend(arguments[1:] for method, arguments in tasks if method == "shrunk")
+            return results(tasks, *more)
+
+        monkeypatch.setattr(workers, "results", noted)
+        best = pruned(search, joint)
+    assert best.names == TRUE
+    assert len(shrunk[0]) > 4
+    assert len(shrunk) < 12  # one at a time takes over thirty
+
+
+def test_where_the_fit_without_all_of_them_is_worse_fewer_go(
+    fitter: Fitter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A forecast that takes what pays for idle, too.
+    monkeypatch.setattr("host.diagnosis.pruning._saved", lambda _, __, members: 100.0 * len(members))
+    with Workers(fitter, 1) as workers:
+        search = search_of(fitter, workers)
+        joint = with_ordinary(search, fitter.grown(fitter.base, "heave_pitch_rate_coupling", []))
+        assert pruned(search, joint).names >= TRUE
