@@ -14,6 +14,7 @@ from host.identify_car import ESTIMATED, car_least_squares, run_estimator
 from host.maximum_likelihood import fit_maximum_likelihood
 from host.model import VehicleModel, model_of
 from host.outliers import without_outliers
+from host.plane_between_rows import with_moving_plane
 from host.predict import Prediction, predict
 from host.recording import Array, Recording
 from host.uncertainty import covariance, covariance_within
@@ -25,6 +26,7 @@ METHODS: tuple[Method, ...] = ("car", "mils", "robust", "ml")
 SHORTEST_TO_SPLIT = 40.0  # s; below it a held-out part would leave too little to learn from
 HELD_OUT_SHARE = 0.3
 FEWEST_ROWS = 10  # of a stretch to learn from
+CLEARLY = 6.0  # of BIC: odds of 20 to 1
 UNKNOWN = 1e4  # of a standard deviation in SI: the recording says nothing at all
 
 Progress = Callable[[str], None]
@@ -61,9 +63,13 @@ def identify(
 ) -> Identification:
     """Identifies one vehicle from its recordings, jointly, by the named method (default: most accurate).
 
-    Spikes are left out first, of what is learnt from and of what judges.
+    Spikes are left out first, of what is learnt from and of what judges. Method ml asks the motion whether
+    the plane held its angles between rows or moved on; for the others, which a vehicle runs on its own
+    commands, it held them.
     """
     recordings = without_outliers(recordings)
+    if method == "ml":
+        recordings = _likelier_between_rows(recordings, on_progress)
     model, fit, history = _learn(recordings, vehicle, method, on_progress)
     held_out = None
     if sum(recording.duration for recording in recordings) >= SHORTEST_TO_SPLIT:
@@ -80,6 +86,18 @@ def identify(
         fit=fit,
         history=history,
     )
+
+
+def _likelier_between_rows(recordings: list[Recording], on_progress: Progress) -> list[Recording]:
+    """The recordings with the plane taken to hold its angles, or clearly likelier to move on evenly."""
+    moving = [with_moving_plane(recording) for recording in recordings]
+    if all(np.array_equal(a.rudder, b.rudder) for a, b in zip(recordings, moving, strict=True)):
+        return recordings
+    on_progress("the plane between rows")
+    held_bic, moving_bic = (
+        fit_maximum_likelihood(each, noise_model="output_error").bic for each in (recordings, moving)
+    )
+    return moving if moving_bic < held_bic - CLEARLY else recordings
 
 
 def _learn(

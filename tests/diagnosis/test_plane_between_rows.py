@@ -16,6 +16,7 @@ from host.diagnosis.fitter import Fitter
 from host.diagnosis.plane_choice import is_likelier, ways
 from host.equations import NAMES
 from host.errors import RecordingError
+from host.identify import identify
 from host.model import model_of, read_model, write_model
 from host.plane_between_rows import NOTE, with_moving_plane
 from host.predict import predict
@@ -79,6 +80,17 @@ def test_what_the_plane_did_is_read_off_the_motion(way: Way) -> None:
     assert (NOTE in first.recordings[0].notes) == (way == "moving")
     assert is_likelier(first, second.fitter.base)
     assert not is_likelier(second, first.fitter.base)
+
+
+@pytest.mark.parametrize("way", ["held", "moving"])
+def test_identification_reads_it_off_the_motion_too(way: Way) -> None:
+    model = identify([dive(way)], default_vehicle()).model
+    assert model.has_moving_plane == (way == "moving")
+    for name in ("a2", "a3", "b2"):
+        assert model.values[name] == pytest.approx(BASE[name], abs=4.0 * model.std[name])
+        assert model.std[name] < 0.02 * abs(BASE[name])
+    on_board = identify([dive(way)], default_vehicle(), "mils").model
+    assert not on_board.has_moving_plane
 
 
 def test_a_moving_plane_is_not_taken_for_physics_and_the_model_moves_it_again(tmp_path: Path) -> None:
