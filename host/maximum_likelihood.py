@@ -17,11 +17,12 @@ from host.equations import BASE, Structure
 from host.filter_error import filter_error
 from host.fit import Fit
 from host.gauss_newton import Point
-from host.noise_floor import resolution
+from host.noise_floor import noise_floor, resolution
 from host.output_error import SMALLEST_NOISE, output_error
 from host.propagate import Inputs, inputs_of
 from host.recording import Array, Recording
 from host.rounding import thinned
+from host.speed_error import speed_error
 from host.start_values import start_values
 from host.valleys import are_apart, other_valleys, plausibility, with_rivals
 from host.wave_forces import wave_forces
@@ -58,7 +59,12 @@ def fit_maximum_likelihood(
     free = np.array([name not in held for name in structure.names])
     steps = resolution(recordings)
     told = thinned(recordings, steps)
-    inputs = [inputs_of(recording, structure, steps=steps) for recording in told]
+    floor = noise_floor(recordings)
+    errors = [speed_error(recording, floor[1]) for recording in recordings]
+    inputs = [
+        inputs_of(recording, structure, steps=steps, speed_error=None if steps[1] else error)
+        for recording, error in zip(told, errors, strict=True)
+    ]
     if starts is None:
         own = [value for effect in structure.effects for value in effect.probes[0]]
         starts = [(np.concatenate([base, own]), initial) for base, initial in start_values(recordings)]
@@ -78,7 +84,8 @@ def fit_maximum_likelihood(
     if noise_model == "output_error" or (noise_model == "auto" and nothing_left):
         return with_rivals(best, others)
     on_progress("random forces, wandering sensors, waves")
-    plain, inputs = best, [inputs_of(recording, structure) for recording in thinned(recordings)]
+    plain, rows = best, zip(thinned(recordings), errors, strict=True)
+    inputs = [inputs_of(recording, structure, speed_error=error) for recording, error in rows]
     if steps.any():  # a filter takes errors for normal: it is compared with a free run that does, too
         start = Point(structure, best.parameters, best.initial, best.noise)
         plain = output_error(start, inputs, free)

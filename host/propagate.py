@@ -16,6 +16,7 @@ import numpy as np
 from host.equations import BASE, STATES, Chain, Structure
 from host.recording import Array, Recording
 from host.speed import smoothed_speed
+from host.speed_error import SpeedError
 
 NX0 = len(STATES)
 MOST_SUBSTEPS = 8  # slow records show no modes faster than their sampling: finer steps would resolve nothing
@@ -34,6 +35,7 @@ class Inputs:
     measured  (2, N) pitch rad and depth m, 0 where missing
     present   (2, N) 1 where measured, else 0
     steps     (2,) of the rounding of pitch and depth where it rules, else 0
+    speed_error  what errors of the measured speed do to depth, where it matters
     """
 
     structure: Structure
@@ -42,6 +44,7 @@ class Inputs:
     present: Array
     substeps: int
     steps: Array = field(default_factory=lambda: np.zeros(2))
+    speed_error: SpeedError | None = None
 
 
 def inputs_of(
@@ -49,11 +52,12 @@ def inputs_of(
     structure: Structure = BASE,
     longest_substep: float = LONGEST_SUBSTEP,
     steps: Array | None = None,
+    speed_error: SpeedError | None = None,
 ) -> Inputs:
     """Inputs of one recording. Longer sub-steps (s) suit vehicles whose modes are known to be slow."""
     intervals = recording.intervals
     known = np.full(intervals.size, float(recording.has_speed))
-    speed = smoothed_speed(recording.speed) if recording.has_speed else np.zeros(intervals.size)
+    speed = smoothed_speed(recording.speed).speed if recording.has_speed else np.zeros(intervals.size)
     surge = np.append(np.diff(speed) / intervals[:-1], 0.0)
     lags = int(np.ceil(LONGEST_DELAY / recording.step)) + 1 if structure.needs_lags else 0
     earlier = [
@@ -71,6 +75,7 @@ def inputs_of(
         present=present.astype(float),
         substeps=int(np.ceil(recording.step / max(longest_substep, recording.step / MOST_SUBSTEPS) - 1e-6)),
         steps=np.zeros(2) if steps is None else steps,
+        speed_error=speed_error,
     )
 
 

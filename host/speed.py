@@ -1,4 +1,6 @@
-"""The speed through the water behind a noisy sensor: the depth integrates its errors."""
+"""The speed through the water behind a noisy sensor, and what errors are left in it."""
+
+from typing import NamedTuple
 
 import numpy as np
 from scipy.fft import dct, idct
@@ -7,24 +9,44 @@ from scipy.optimize import minimize_scalar
 from host.recording import Array
 
 
-def smoothed_speed(measured: Array) -> Array:
+class SmoothedSpeed(NamedTuple):
+    """The most likely speed, and its error, a first-order random process v' = decay v + ...
+
+    speed     (N,) m/s
+    variance  of the error, (m/s)^2
+    decay     of the error from row to row
+    """
+
+    speed: Array
+    variance: float
+    decay: float
+
+
+def smoothed_speed(measured: Array) -> SmoothedSpeed:
     """Most likely speed (N,) when it wanders at random (variance q a row) under white noise (variance r).
 
     In cosine transforms both are independent: y_k ~ r + q / d_k, d_k = 2 - 2 cos(pi k / N), and the mean
-    square optimum is y_k / (1 + r d_k / q). The ratio r / q is the likeliest; of a constant speed the mean
-    is left.
+    square optimum is y_k / (1 + r d_k / q). The ratio c = r / q is the likeliest; of a constant speed the
+    mean is left. The variance of the error is r / (1 + c d_k): that of a process with the decay a for which
+    a / (1 - a)^2 = c, and the variance r (1 - a) / (1 + a).
     """
     rows = measured.size
     if rows < 8 or np.ptp(measured) == 0.0:
-        return measured
+        return SmoothedSpeed(measured, 0.0, 0.0)
     transform = dct(measured, norm="ortho")
     power, stiffness = transform[1:] ** 2, 2.0 - 2.0 * np.cos(np.pi * np.arange(1, rows) / rows)
 
+    def noise(log_ratio: float) -> float:
+        return float(np.mean(power / (1.0 + np.exp(-log_ratio) / stiffness)))
+
     def cost(log_ratio: float) -> float:
         shape = 1.0 + np.exp(-log_ratio) / stiffness
-        return float((rows - 1) * np.log(np.mean(power / shape)) + np.sum(np.log(shape)))
+        return float((rows - 1) * np.log(noise(log_ratio)) + np.sum(np.log(shape)))
 
     # From hardly any noise to hardly any change over the whole recording.
     found = minimize_scalar(cost, bounds=(-25.0, 2.0 * np.log(rows) + 7.0), method="bounded")
-    kept = 1.0 / (1.0 + np.exp(found.x) * stiffness)
-    return np.asarray(idct(np.concatenate([transform[:1], kept * transform[1:]]), norm="ortho"))
+    ratio = np.exp(found.x)
+    kept = 1.0 / (1.0 + ratio * stiffness)
+    speed = np.asarray(idct(np.concatenate([transform[:1], kept * transform[1:]]), norm="ortho"))
+    decay = float(2.0 * ratio / (2.0 * ratio + 1.0 + np.sqrt(4.0 * ratio + 1.0)))
+    return SmoothedSpeed(speed, noise(found.x) * (1.0 - decay) / (1.0 + decay), decay)

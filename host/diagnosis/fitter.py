@@ -33,7 +33,8 @@ from host.noise_floor import noise_floor, resolution
 from host.output_error import annealed, free_run_cost, output_error
 from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
 from host.recording import Array, Recording
-from host.rounding import thinned
+from host.rounding import NO_STEPS, thinned
+from host.speed_error import speed_error
 from host.valleys import (
     SHARING_POLES,
     look_alikes,
@@ -71,6 +72,7 @@ class Fitter:
         self.thinned = thinned(recordings)
         self._told = thinned(recordings, self.steps)
         self.accelerations = accelerations(self.thinned)
+        self._speed_errors = [speed_error(recording, self.floor[1]) for recording in recordings]
         self.held = dict(HELD)
         if recordings[0].has_speed:
             self.held["u0"] = float(np.mean([r.speed.mean() for r in recordings]))
@@ -265,10 +267,11 @@ class Fitter:
         A filter takes errors for normal: of rounded readings it gets no more than they tell.
         """
         if (names, for_filter) not in self._inputs:
-            structure, steps = structure_of(names), None if for_filter else self.steps
+            structure, steps = structure_of(names), NO_STEPS if for_filter else self.steps
+            rows = zip(self.thinned if for_filter else self._told, self._speed_errors, strict=True)
             self._inputs[names, for_filter] = [
-                inputs_of(recording, structure, self._longest_substep, steps)
-                for recording in (self.thinned if for_filter else self._told)
+                inputs_of(recording, structure, self._longest_substep, steps, None if steps[1] else error)
+                for recording, error in rows
             ]
         return self._inputs[names, for_filter]
 

@@ -9,17 +9,29 @@ from host.speed import smoothed_speed
 def test_a_constant_speed_gives_its_mean() -> None:
     rng = np.random.default_rng(1)
     measured = 1.5 + 0.01 * rng.standard_normal(2000)
-    assert np.abs(smoothed_speed(measured) - 1.5).max() < 0.002
+    assert np.abs(smoothed_speed(measured).speed - 1.5).max() < 0.002
 
 
 def test_a_wandering_speed_is_followed() -> None:
     rng = np.random.default_rng(2)
     truth = 1.5 + 0.3 * np.sin(np.arange(2000) / 150.0)
-    found = smoothed_speed(truth + 0.01 * rng.standard_normal(2000))
+    found = smoothed_speed(truth + 0.01 * rng.standard_normal(2000)).speed
     assert np.sqrt(np.mean((found - truth) ** 2)) < 0.004
 
 
 def test_a_speed_without_noise_is_kept() -> None:
     truth = 1.5 + 0.3 * np.sin(np.arange(500) / 10.0)
-    assert smoothed_speed(truth) == pytest.approx(truth, abs=2e-3)
-    assert smoothed_speed(np.full(100, 2.0)) == pytest.approx(np.full(100, 2.0))
+    assert smoothed_speed(truth).speed == pytest.approx(truth, abs=2e-3)
+    assert smoothed_speed(np.full(100, 2.0)).speed == pytest.approx(np.full(100, 2.0))
+
+
+def test_the_error_that_is_left_is_told() -> None:
+    rng = np.random.default_rng(3)
+    truth = 1.5 + np.cumsum(0.004 * rng.standard_normal(4000))
+    errors = [smoothed_speed(truth + 0.05 * rng.standard_normal(4000)).speed - truth for _ in range(20)]
+    told = smoothed_speed(truth + 0.05 * rng.standard_normal(4000))
+    each = np.array(errors)
+    assert told.variance == pytest.approx(float(np.mean(each**2)), rel=0.2)
+    for lag in (1, 10):
+        measured = float(np.mean(each[:, lag:] * each[:, :-lag]) / np.mean(each**2))
+        assert told.decay**lag == pytest.approx(measured, abs=0.1)
