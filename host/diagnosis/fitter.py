@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from host.catalogue import CATALOGUE, CHANGES, named, structure_of
-from host.catalogue.kin import OFFSETS, as_trim
 from host.catalogue.moments import FIRST, LAST
 from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import SPANS
@@ -24,6 +23,7 @@ from host.diagnosis.starts import (
     with_usual_heave,
     with_usual_pitch,
 )
+from host.diagnosis.trims import HELD, retrimmed, trimmed
 from host.equations import NAMES, Effect
 from host.filter_error import filter_error_from
 from host.fit import Fit
@@ -44,9 +44,7 @@ from host.valleys import (
 )
 from host.wave_forces import wave_forces_from
 
-HELD = {"heave_offset": 0.0, "pitch_offset": 0.0}  # in a diagnosis an offset is an effect
 ALARM_EARLY = 30.0  # s, by which a moment that somebody names may lie before the change
-COMPRESSED = "depth_dependent_buoyancy"
 # Enough to rank sets; those that count are polished.
 FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 25, 0.2
 PATIENT_ITERATIONS = 20  # from a point of another valley, which may lie far up its side
@@ -107,42 +105,11 @@ class Fitter:
         return self.explained(frozenset(), fit)
 
     def trimmed(self) -> Explanation:
-        """The base with a free constant force and moment, from which the search for all else sets out."""
-        held = {name: value for name, value in self.held.items() if name in NAMES and name not in HELD}
-        fit = fit_maximum_likelihood(self.recordings, held=held, noise_model="output_error")
-        names = frozenset({FREE_TRIM.name})
-        values = fit.parameters.copy()
-        trim = [NAMES.index(name) for name in HELD]
-        offsets, values[trim] = values[trim], 0.0
-        structure, base = structure_of(names), self.base.fit
-        starts = [
-            Point(structure, np.concatenate([values, offsets]), fit.initial, fit.noise),
-            Point(structure, np.concatenate([base.parameters, np.zeros(2)]), base.initial, base.noise),
-        ]
-        best = max(map(self.carried_on, starts), key=plausibility)
-        return self.explained(names, best)
+        """The base with a free constant force and moment; see host.diagnosis.trims, as for `retrimmed`."""
+        return trimmed(self)
 
     def retrimmed(self, explanation: Explanation, offsets: Names) -> Explanation:
-        """The same set with some of the catalogue's offsets in place of those it has, or of the free trim.
-
-        Not polished: most of the offsets that are tried explain nothing.
-        """
-        names = (explanation.names - {FREE_TRIM.name, *OFFSETS}) | offsets
-        fit = explanation.fit
-        known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
-        shift = np.zeros(2)
-        for name in explanation.names & {FREE_TRIM.name, *OFFSETS}:
-            shift += as_trim(known, name) @ [known[p.name] for p in named(name).parameters]
-        chosen = sorted(offsets)
-        if not chosen and COMPRESSED in names:  # its neutral depth takes over
-            known["neutral_depth"] -= shift[0] / (known["c_wz"] or np.inf)
-        table = np.hstack([np.zeros((2, 0)), *(as_trim(known, name) for name in chosen)])
-        values = np.linalg.lstsq(table, shift, rcond=1e-8)[0] if chosen else np.zeros(0)
-        known |= {named(n).parameters[0].name: float(v) for n, v in zip(chosen, values, strict=True)}
-        structure = structure_of(names)
-        parameters = np.array([known[name] for name in structure.names])
-        start = Point(structure, parameters, fit.initial, fit.levels)
-        return self.explained(names, self._fit([start], hopeless(fit)))
+        return retrimmed(self, explanation, offsets, hopeless(explanation.fit))
 
     def excess(self, fit: Fit) -> float:
         """Sensor noise of a fit over the noise floor, in the worse channel: 1 where nothing is left."""
@@ -161,7 +128,7 @@ class Fitter:
                 coefficients of a parent without either may be bent into another valley
         """
         starts = starts_of(self, parent, name, values, rival)
-        fit = self._fit(starts)
+        fit = self.fitted(starts)
         if parent.fit.has_process_noise:
             return self.explained(parent.names | {name}, fit)
         end = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
@@ -169,10 +136,10 @@ class Fitter:
         if not has_usual_heave(end):
             again += with_usual_heave(end)
         again += with_usual_pitch(self, parent, name, values)
-        others = [self._fit([start], hopeless(fit), PATIENT_ITERATIONS) for start in again]
+        others = [self.fitted([start], hopeless(fit), PATIENT_ITERATIONS) for start in again]
         fit = max([fit, *others], key=plausibility)
         if named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
-            fit = self._fit([idle(starts[0], name)])
+            fit = self.fitted([idle(starts[0], name)])
         return self.explained(parent.names | {name}, fit)
 
     def gain(self, parent: Explanation, name: str, values: list[Array], is_thorough: bool) -> float:
@@ -194,7 +161,7 @@ class Fitter:
         starts = [start]
         if is_far(self, parent):
             starts.append(guess(self, start, names))
-        return self.explained(names, self._fit(starts))
+        return self.explained(names, self.fitted(starts))
 
     def reduced(self, explanation: Explanation, names: Names) -> Explanation:
         """The set with these members only."""
@@ -228,11 +195,11 @@ class Fitter:
             for recording in self.recordings
         ]
         start = self._begun(Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0])))
-        fit = self._fit([start])
+        fit = self.fitted([start])
         if self.excess(fit) > NOT_THERE * self.excess(explanation.fit):
             inputs = self.inputs(explanation.names, for_filter=True)
             moved = annealed(start, inputs, fit.free, self.accelerations)
-            fit = self._fit([start, moved])
+            fit = self.fitted([start, moved])
         return self.polished(self.explained(explanation.names, fit), EXACT)
 
     def _begun(self, start: Point) -> Point:
@@ -291,7 +258,7 @@ class Fitter:
         structure = structure_of(names)
         return Point(structure, np.array([known[name] for name in structure.names]), fit.initial, fit.levels)
 
-    def _fit(self, starts: list[Point], least: float = -np.inf, first: int = FIRST_ITERATIONS) -> Fit:
+    def fitted(self, starts: list[Point], least: float = -np.inf, first: int = FIRST_ITERATIONS) -> Fit:
         """Goes a few steps from every start, and on from the best where that is at least so likely."""
         structure = starts[0].structure
         names = frozenset(effect.name for effect in structure.effects)
