@@ -62,7 +62,7 @@ def fit_maximum_likelihood(
     floor = noise_floor(recordings)
     errors = [speed_error(recording, floor[1]) for recording in recordings]
     inputs = [
-        inputs_of(recording, structure, steps=steps, speed_error=None if steps[1] else error)
+        inputs_of(recording, structure, steps=steps, speed_error=error)
         for recording, error in zip(told, errors, strict=True)
     ]
     if starts is None:

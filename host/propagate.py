@@ -54,8 +54,12 @@ def inputs_of(
     steps: Array | None = None,
     speed_error: SpeedError | None = None,
 ) -> Inputs:
-    """Inputs of one recording. Longer sub-steps (s) suit vehicles whose modes are known to be slow."""
+    """Inputs of one recording. Longer sub-steps (s) suit vehicles whose modes are known to be slow.
+
+    Where rounding rules depth (steps), what errors of speed do to it is lost in the rounding.
+    """
     intervals = recording.intervals
+    steps = np.zeros(2) if steps is None else steps
     known = np.full(intervals.size, float(recording.has_speed))
     speed = smoothed_speed(recording.speed).speed if recording.has_speed else np.zeros(intervals.size)
     surge = np.append(np.diff(speed) / intervals[:-1], 0.0)
@@ -74,8 +78,8 @@ def inputs_of(
         measured=np.where(present, measured, 0.0),
         present=present.astype(float),
         substeps=int(np.ceil(recording.step / max(longest_substep, recording.step / MOST_SUBSTEPS) - 1e-6)),
-        steps=np.zeros(2) if steps is None else steps,
-        speed_error=speed_error,
+        steps=steps,
+        speed_error=None if steps[1] else speed_error,
     )
 
 

@@ -237,7 +237,7 @@ class Fitter:
             structure, steps = structure_of(names), NO_STEPS if for_filter else self.steps
             rows = zip(self.thinned if for_filter else self._told, self._speed_errors, strict=True)
             self._inputs[names, for_filter] = [
-                inputs_of(recording, structure, self._longest_substep, steps, None if steps[1] else error)
+                inputs_of(recording, structure, self._longest_substep, steps, error)
                 for recording, error in rows
             ]
         return self._inputs[names, for_filter]

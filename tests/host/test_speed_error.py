@@ -16,7 +16,7 @@ BASE = np.array([-0.63084, -3.38699, -8.19858, 0.41385, -3.94120, 1.5, 0.0, 0.0]
 DEPTH_NOISE, PITCH_NOISE, SPEED_NOISE = 0.005, 0.001, 0.05
 
 
-def dive(rng: np.random.Generator, rows: int = 1500, speed_noise: float = SPEED_NOISE) -> Recording:
+def dive(rng: np.random.Generator, rows: int = 1500) -> Recording:
     """A dive of known coefficients whose speed wanders, behind noisy sensors at 5 Hz."""
     h, nothing = 0.2, np.full(rows, np.nan)
     rudder = np.repeat(rng.uniform(-0.3, 0.3, rows // 25), 25)
@@ -38,7 +38,7 @@ def dive(rng: np.random.Generator, rows: int = 1500, speed_noise: float = SPEED_
         true,
         pitch=pitch + PITCH_NOISE * rng.standard_normal(rows),
         depth=depth + DEPTH_NOISE * rng.standard_normal(rows),
-        speed=true.speed + speed_noise * rng.standard_normal(rows),
+        speed=true.speed + SPEED_NOISE * rng.standard_normal(rows),
     )
 
 
