@@ -13,8 +13,8 @@ import numpy as np
 from host.gauss_newton import GaussNewton, Mask, Point
 from host.recording import Array
 
-DIFFERENCE = 1e-3  # of a log noise level, for derivatives
-LONGEST_STRIDE = 2.5  # of a log noise level in one step
+DIFFERENCE = 1e-3  # of a log noise level, or of one that has a sign, for derivatives
+LONGEST_STRIDE = 2.5  # of the same in one step
 SETTLED = 0.02  # of the log-likelihood: a step that gains less is the last
 
 
@@ -36,10 +36,15 @@ P = TypeVar("P", bound=Pass)
 
 
 class NoiseModel(Protocol[P]):
-    """What turns a point, with its noise levels, into innovations; `least`, `most` bound the levels."""
+    """What turns a point, with its noise levels, into innovations.
+
+    least, most  bound the levels
+    signed       those that may be negative, and move by differences instead of factors
+    """
 
     least: Array
     most: Array
+    signed: Mask
 
     def passes(self, point: Point) -> list[P]:
         """Of each recording."""
@@ -92,19 +97,18 @@ def ascend(
 
 
 class _Scoring(Generic[P]):
-    """Scores and Fisher information of the log noise levels, by differences of the innovations.
+    """Scores and Fisher information of the noise levels, by differences of the innovations.
 
     d log L = 1/2 sum_k [e^T S^-1 dS S^-1 e - tr(S^-1 dS) - 2 e^T S^-1 de]
     F_ij = sum_k [1/2 tr(S^-1 d_i S S^-1 d_j S) + d_i e^T S^-1 d_j e]
     """
 
     def __init__(self, here: Place[P], model: NoiseModel[P]) -> None:
-        self.noise, self.least, self.most = here.point.noise, model.least, model.most
+        self.noise, self.model = here.point.noise, model
         levels = self.noise.size
         self.score, self.information = np.zeros(levels), np.zeros((levels, levels))
         moved = [
-            model.passes(here.point.with_noise(self.noise * np.exp(DIFFERENCE * unit)))
-            for unit in np.eye(levels)
+            model.passes(here.point.with_noise(self._moved(DIFFERENCE * unit))) for unit in np.eye(levels)
         ]
         for k, run in enumerate(here.passes):
             de = np.array([(passes[k].error - run.error) / DIFFERENCE for passes in moved])
@@ -124,7 +128,11 @@ class _Scoring(Generic[P]):
         diagonal = np.diag(self.information)
         normal = self.information + np.diag(damping * diagonal + 1e-6 * diagonal.max())
         stride = np.clip(np.linalg.solve(normal, self.score), -LONGEST_STRIDE, LONGEST_STRIDE)
-        return np.asarray(np.clip(self.noise * np.exp(stride), self.least, self.most))
+        return np.asarray(np.clip(self._moved(stride), self.model.least, self.model.most))
+
+    def _moved(self, stride: Array) -> Array:
+        signed = self.model.signed
+        return np.where(signed, self.noise + stride, self.noise * np.exp(np.where(signed, 0.0, stride)))
 
 
 def _det(run: Pass) -> Array:

@@ -54,6 +54,8 @@ class WhitenedPass:
 class WanderingSensors:
     """Levels: white variances r of pitch, depth; wandering variances s; correlation times T, s."""
 
+    signed = np.zeros(6, dtype=bool)
+
     def __init__(self, inputs: list[Inputs]) -> None:
         self.inputs = inputs
         step = float(np.median(np.concatenate([one.drive[3] for one in inputs])))

@@ -19,6 +19,7 @@ class RandomForces:
 
     least = np.array([1e-12, 1e-10, 1e-16, 1e-16])  # below anything that acts
     most = np.array([1e3, 1e6, 1e3, 1e3])
+    signed = np.zeros(4, dtype=bool)
 
     def __init__(self, inputs: list[Inputs]) -> None:
         self.inputs = inputs

@@ -26,10 +26,12 @@ class Fit:
     free         (n,) False where the parameter was held
     information  (n, n) Fisher information of the parameters, initial states eliminated; zero for held ones
     initial      states (4,) at each recording's first row
-    noise        (4,) variances of pitch rad^2, depth m^2; densities of unknown heave, pitch acceleration
+    noise        (4,) variances of pitch rad^2, depth m^2; densities of unknown heave, pitch acceleration,
+                 or of what stands for them among waves
     wander       variance and correlation time s of the part of each sensor's error, pitch and depth, that
                  wanders (2, 2); zero where all of it is white
-    waves        frequency rad/s and damping ratio of the random forces, (2,); zero where they are white
+    waves        frequency rad/s and damping ratio of the waves, and what else host.waves tells of them, (5,);
+                 zero where there are none
     deviance     -2 log-likelihood at these noise levels, but for what depends on them alone: the sum of the
                  squared innovations, unless readings are rounded
     rivals       other maxima that are almost as likely
@@ -51,7 +53,7 @@ class Fit:
     iterations: int
     converged: bool
     wander: Array = field(default_factory=lambda: np.zeros((2, 2)))
-    waves: Array = field(default_factory=lambda: np.zeros(2))
+    waves: Array = field(default_factory=lambda: np.zeros(5))
     rivals: tuple[Rival, ...] = ()
 
     @property
@@ -60,10 +62,8 @@ class Fit:
 
     @property
     def levels(self) -> Array:
-        """What a fit that goes on from here starts with: `noise`; under waves (6,), see host.wave_forces."""
-        if not self.waves.any():
-            return self.noise
-        return np.concatenate([self.noise[:2], self.noise[2:] * self.waves[0] ** 4, self.waves])
+        """What a fit that goes on from here starts with: `noise`; among waves (7,), see host.waves."""
+        return np.concatenate([self.noise[:2], self.waves]) if self.waves.any() else self.noise
 
     @property
     def has_coloured_noise(self) -> bool:
@@ -73,7 +73,7 @@ class Fit:
     def noise_levels(self) -> int:
         """How many numbers describe the noise."""
         if self.has_process_noise:
-            return 6 if self.waves.any() else 4
+            return 7 if self.waves.any() else 4
         return 6 if self.has_coloured_noise else 2
 
     @property

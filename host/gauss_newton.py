@@ -17,7 +17,7 @@ INITIAL_STATE_PRIOR = np.array([1.0, 1.0, 1.0, 100.0])  # std of w, q, theta, ze
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A point of the search: parameters, initial states (4,) of each recording, noise (4,), in waves (6,)."""
+    """A point of the search: parameters, initial states (4,) of each recording, noise (4,), in waves (7,)."""
 
     structure: Structure
     parameters: Array

@@ -180,9 +180,9 @@ def _notes(fit: Fit | None, method: Method) -> list[str]:
             "corrected for it."
         )
     if fit.waves.any():
-        frequency, damping = fit.waves
+        frequency, damping = fit.waves[:2]
         notes.append(
-            f"The random forces swing like waves: met at {frequency:.2g} rad/s (every "
+            f"Waves carry the vehicle: met at {frequency:.2g} rad/s (every "
             f"{2.0 * np.pi / frequency:.2g} s), damping ratio {damping:.2g}."
         )
     if fit.has_coloured_noise:

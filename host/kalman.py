@@ -48,7 +48,7 @@ def _kalman(form: Form) -> ca.Function:
 
 def _shaken(structure: Structure) -> tuple[str, str]:
     """The two states that white noise drives: the waves' where there are any, else the vehicle's own."""
-    waves = ("heave_wave_rate", "pitch_wave_rate")
+    waves = ("wave_rate", "turning_wave_rate")
     return waves if set(waves) <= set(structure.states) else ("w", "q")
 
 

@@ -2,7 +2,7 @@
 
 Minimises -log L = 1/2 sum_k [log det S_k + e_k^T S_k^-1 e_k] over the parameters, the initial state of each
 recording and the noise levels. In output error (host.output_error) the model runs freely and S is the
-sensors' noise; in filter error (host.filter_error, host.wave_forces) a Kalman filter gives e and S; where the
+sensors' noise; in filter error (host.filter_error, host.waves) a Kalman filter gives e and S; where the
 sensors' errors wander, a filter in each sensor does (host.coloured_noise). Source: Maine and Iliff, NASA
 RP-1138; Klein and Morelli, Aircraft System Identification, ch. 6.
 """
@@ -25,7 +25,7 @@ from host.rounding import thinned
 from host.speed_error import speed_error
 from host.start_values import start_values
 from host.valleys import are_apart, other_valleys, plausibility, with_rivals
-from host.wave_forces import wave_forces
+from host.waves import in_waves
 from host.whiteness import is_white
 
 NoiseModel = Literal["auto", "output_error", "filter_error"]
@@ -109,13 +109,13 @@ def _noise_models(start: Fit, inputs: list[Inputs]) -> Iterator[Fit]:
     yield filtered
     yield coloured_noise(start, inputs)
     if filtered.bic < start.bic:
-        yield wave_forces(filtered, inputs)
+        yield in_waves(filtered, inputs)
 
 
 def _like(chosen: Fit, start: Fit, inputs: list[Inputs]) -> Fit:
     """Another end under the noise model that was chosen."""
     if chosen.waves.any():
-        return wave_forces(filter_error(start, inputs), inputs)
+        return in_waves(filter_error(start, inputs), inputs)
     if chosen.has_process_noise:
         return filter_error(start, inputs)
     return coloured_noise(start, inputs) if chosen.has_coloured_noise else start

@@ -34,6 +34,8 @@ NEARLY_REAL = 0.3  # of its real part, the imaginary part of a pole that may be 
 APART = 4.0  # standard deviations between two modes
 USUAL_SPEED, SPEED_FACTOR = 1.5, 3.0  # m/s; gliders make 0.3, torpedoes 10
 USUAL_DAMPING, DAMPING_FACTOR = -1.0, 5.0  # 1/s, of a1; gliders 0.1, small quick hulls 6
+# 1/s, of a1: a model that lacks an effect may follow its plane at once, or hardly at all.
+INSTANT, IDLE = -10.0, -0.1
 A1, A2, A3, B1, B2, U0 = (NAMES.index(name) for name in ("a1", "a2", "a3", "b1", "b2", "u0"))
 LAGS, DEPTH_LAG, MUNK, COUPLING = ("lag_time", "pitch_lag_time"), "depth_lag_time", "c_qw", "c_wq"
 SHARING_POLES = (*LAGS, DEPTH_LAG, MUNK)  # parameters of effects that bring a pole of their own
@@ -131,6 +133,27 @@ def with_poles_swapped(point: Point) -> list[Point]:
             moved[names.index(MUNK)] += b2 * (pole - a1) / b1
             swapped.append(moved)
     return [replace(point, parameters=point.structure.clipped(moved)) for moved in swapped]
+
+
+def has_usual_heave(point: Point) -> bool:
+    """Whether heave neither follows the plane at once nor hardly moves."""
+    return bool(INSTANT < point.parameters[A1] < IDLE)
+
+
+def with_usual_heave(start: Point) -> list[Point]:
+    """Starts with the heave damping of a usual vehicle.
+
+    If heave was fast, with the same steady velocity; if it hardly moved, with a plane that pushes either way.
+    """
+    a1, b1, b2 = start.parameters[[A1, B1, B2]]
+    usual = USUAL_LEVER * b2
+    forces = [b1 * USUAL_DAMPING / a1] if a1 < INSTANT else [usual, -usual]
+    starts = []
+    for force in forces:
+        parameters = start.parameters.copy()
+        parameters[[A1, B1]] = USUAL_DAMPING, force
+        starts.append(replace(start, parameters=parameters))
+    return starts
 
 
 def _with_pitch_poles(values: Array, one: float, other: float) -> Array:

@@ -43,14 +43,14 @@ def crosscovariance(first: Array, second: Array, lags: int) -> Array:
     return np.asarray(sums / np.maximum(pairs, 1.0))
 
 
-def is_white(innovations: Array, lags: int = 20, significance: float = 0.001) -> bool:
+def is_white(innovations: Array, lags: int = 20, significance: float = 0.001, slack: float = 0.0) -> bool:
     """Box-Pierce test on each row of (outputs, N) innovations, whatever their variances.
 
         sum_k (sum_t e_t e_(t+k))^2 / sum_t e_t^2 e_(t+k)^2  ~  chi2(lags),   k = 1..lags
 
     (Lobato, Nankervis and Savin, Int. Econ. Rev. 42(3), 2001). A rounded reading tells much near the edge of
     its step and next to nothing inside; of equal variances such innovations would look coloured.
-    A row of few values, or that never changes, tells nothing against it.
+    A row of few values, or that never changes, tells nothing against it, nor do correlations up to `slack`.
     """
     for values in innovations:
         present = values[np.isfinite(values)]
@@ -58,6 +58,7 @@ def is_white(innovations: Array, lags: int = 20, significance: float = 0.001) ->
             continue
         centred = _centred(values)
         products, scatter = _lagged_sums(centred, lags)[1:], _lagged_sums(centred**2, lags)[1:]
+        products = np.maximum(np.abs(products) - slack * np.sum(centred**2), 0.0)
         statistic = np.sum(products**2 / np.maximum(scatter, np.finfo(float).tiny))
         if statistic > chi2.ppf(1.0 - significance, lags):
             return False

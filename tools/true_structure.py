@@ -57,7 +57,7 @@ def heldout_errors(path: Path, names: tuple[str, ...], start: dict[str, float]) 
     candidates = []
     members = [name for name in names if name not in offsets]
     for order in permutations(members) if len(members) <= MOST_PERMUTED else [members]:
-        grown = fitter.trimmed()
+        grown = fitter.root
         for name in order:
             grown = fitter.grown(grown, name, [])
         candidates.append(fitter.polished(fitter.retrimmed(fitter.polished(grown), offsets)))

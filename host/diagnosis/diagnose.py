@@ -11,14 +11,14 @@ from host.catalogue import BY_NAME, UNKNOWN, named
 from host.diagnosis.exchange import twins
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.leftover import Leftover, leftover
+from host.diagnosis.leftover import leftover
 from host.diagnosis.locate import Location, locate
 from host.diagnosis.plane_choice import Way, is_likelier, ways
 from host.diagnosis.pruning import leanest
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.sea_fits import with_sea
 from host.diagnosis.search import Search
-from host.diagnosis.seas import WAVES, Waves, among_waves, in_a_sea
+from host.diagnosis.seas import WAVES, Explained, among_waves, in_a_sea, in_plain_waves
 from host.diagnosis.spans import Spans, divide, excerpt
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.unknown_physics import known_in, unknown_in, with_unknown
@@ -74,15 +74,6 @@ class Diagnosis:
     std: dict[str, float] = field(default_factory=dict)
 
 
-class Explained(NamedTuple):
-    """The best explanation, the search that found it, what it leaves, and the waves it was found among."""
-
-    best: Explanation
-    search: Search
-    left: Leftover
-    waves: Waves | None
-
-
 class Judged(NamedTuple):
     """What the held-out spans say of the base and of the model, what is named, where, and the verdict."""
 
@@ -107,18 +98,18 @@ def diagnose(
 
 def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], jobs: int) -> Diagnosis:
     """The diagnosis with the plane taken so, unless what is found speaks for another way."""
-    recordings, fitter = way
+    recordings, fitter, plain = way
     floor = noise_floor(recordings)
     spans = divide(recordings)
     part = None
     if excerpt(spans.teaching) is not spans.teaching:
         on_progress("an excerpt")
         with Workers(fitter, jobs) as workers:
-            part = _explain(fitter, workers, on_progress)
+            part = _explain(fitter, workers, on_progress, waves=plain)
         on_progress("the whole")
         fitter = Fitter(spans.teaching)
     with Workers(fitter, jobs) as workers:
-        explained = _explain(fitter, workers, on_progress, part)
+        explained = _explain(fitter, workers, on_progress, part, plain if part is None else None)
         again = next((other for other in others if is_likelier(other, explained.best)), None)
         if again is None:
             judged = _judge(explained, spans, floor, on_progress)
@@ -172,13 +163,22 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
 
 
 def _explain(
-    fitter: Fitter, workers: Workers, on_progress: Callable[[str], None], part: Explained | None = None
+    fitter: Fitter,
+    workers: Workers,
+    on_progress: Callable[[str], None],
+    part: Explained | None = None,
+    waves: Explanation | None = None,
 ) -> Explained:
-    """Searches for the best explanation, or goes on from that of a part, where most has been settled."""
+    """Searches for the best explanation, or goes on from that of a part, where most has been settled.
+
+    waves  the root among waves, where these are plain to see
+    """
     known = None if part is None else part.search
-    search = Search(fitter, workers, on_progress, fitter.base, fitter.trimmed(), known)
+    search = Search(fitter, workers, on_progress, fitter.base, fitter.root, known)
+    if waves is not None and (explained := in_plain_waves(search, waves)) is not None:
+        return explained
     best = search.run([] if part is None else [fitter.refitted(part.best)])
-    left, waves = leftover(fitter, best), None
+    left, told = leftover(fitter, best), None
     if best.names or not left.is_nothing:
         best = with_unknown(search, best)
         left = leftover(fitter, best)
@@ -187,11 +187,11 @@ def _explain(
         calm = best
         search, best = in_a_sea(search, best)
         if part is None or part.waves is not None:
-            search, best, waves = among_waves(search, best, calm)
-        left = leftover(fitter, best if waves is None else waves.fitted)
-    if waves is None and (lean := leanest(search, best)) is not best:
+            search, best, told = among_waves(search, best, calm)
+        left = leftover(fitter, best if told is None else told.fitted)
+    if told is None and (lean := leanest(search, best)) is not best:
         best, left = lean, leftover(fitter, lean)
-    return Explained(best, search, left, waves)
+    return Explained(best, search, left, told)
 
 
 def _named(search: Search, best: Explanation, spans: Spans, floor: Array, after: Misfit) -> list[NamedEffect]:

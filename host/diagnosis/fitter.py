@@ -1,6 +1,7 @@
 """Fits of sets of effects, jointly with the base, to the recordings of one vehicle."""
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -16,11 +17,9 @@ from host.diagnosis.prospects import form_gains, gain
 from host.diagnosis.spans import ALARM_LATE
 from host.diagnosis.starts import (
     guess,
-    has_usual_heave,
     idle,
     is_far,
     starts_of,
-    with_usual_heave,
     with_usual_pitch,
 )
 from host.diagnosis.trims import HELD, retrimmed, trimmed
@@ -37,12 +36,14 @@ from host.rounding import NO_STEPS, thinned
 from host.speed_error import speed_error
 from host.valleys import (
     SHARING_POLES,
+    has_usual_heave,
     look_alikes,
     other_valleys,
     plausibility,
     with_rivals,
+    with_usual_heave,
 )
-from host.wave_forces import wave_forces_from
+from host.waves import in_waves_from
 
 ALARM_EARLY = 30.0  # s, by which a moment that somebody names may lie before the change
 # Enough to rank sets; those that count are polished.
@@ -104,7 +105,8 @@ class Fitter:
         fit = fit_maximum_likelihood(self.recordings, held=held, noise_model="output_error")
         return self.explained(frozenset(), fit)
 
-    def trimmed(self) -> Explanation:
+    @cached_property
+    def root(self) -> Explanation:
         """The base with a free constant force and moment; see host.diagnosis.trims, as for `retrimmed`."""
         return trimmed(self)
 
@@ -287,7 +289,7 @@ class Fitter:
         names = frozenset(effect.name for effect in start.structure.effects)
         inputs, free = self.inputs(names, for_filter=True), self.free(names)
         if start.noise.size > 4:
-            return wave_forces_from(start, inputs, free, holds_noise=True)
+            return in_waves_from(start, inputs, free, holds_noise=True)
         return filter_error_from(start, inputs, free, holds_noise=holds_noise)
 
 

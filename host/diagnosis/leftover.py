@@ -18,6 +18,7 @@ from host.whiteness import correlation_factor, is_even, is_white
 
 SIGNIFICANCE = 1e-4
 SEA_DOUBT = 1.5  # no sea is as white and steady as the filter takes it to be
+WAVE_COLOUR = 0.05  # autocorrelation that the shape of a spectrum leaves: no sea has one peak of second order
 GROUPS, LEAST_IN_GROUP = 10, 5
 LEAST_SEA = 0.003  # m/s; below it physics left out, not moving water, is what passes for noise
 MOVEMENT_SPAN = 0.5  # s
@@ -64,9 +65,9 @@ def leftover(fitter: Fitter, best: Explanation) -> Leftover:
     by_intervals = (fitter.steps > 0.0) & (not fit.has_process_noise)
     innovations = [e[~rounded | by_intervals] for e in fit.whitened]
     gain = fitter.gain(best, ANY_SMOOTH_FORCE.name, [], is_thorough=True) / correlation_factor(fit.whitened)
-    terms = len(ANY_SMOOTH_FORCE.parameters)
+    terms, slack = len(ANY_SMOOTH_FORCE.parameters), WAVE_COLOUR if fit.waves.any() else 0.0
     return Leftover(
-        is_coloured=not all(is_white(e, significance=SIGNIFICANCE) and is_even(e) for e in innovations),
+        is_coloured=not all(is_white(e, 20, SIGNIFICANCE, slack) and is_even(e) for e in innovations),
         is_local=_is_local(fitter.recordings, even),
         is_no_sea=fit.has_process_noise and not fit.waves.any() and _heave_by_sea(fit) < LEAST_SEA,
         is_above_floor=is_above_floor(fitter, fit),

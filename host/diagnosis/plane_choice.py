@@ -1,5 +1,6 @@
 """Whether a plane held its angles between rows or moved on (host.plane_between_rows): asked of the motion."""
 
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -7,28 +8,38 @@ import numpy as np
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import NAMING_MARGIN
+from host.diagnosis.seas import plain_waves
 from host.diagnosis.spans import divide, excerpt
 from host.plane_between_rows import with_moving_plane
 from host.recording import Recording
 
 
 class Way(NamedTuple):
-    """The recordings with the plane taken one way, and the base fitted to what a search begins with."""
+    """The recordings with the plane taken one way, and the base fitted to what a search begins with.
+
+    waves  the base among waves, where these are plain to see
+    """
 
     recordings: list[Recording]
     fitter: Fitter
+    waves: Explanation | None = None
 
 
 def ways(recordings: list[Recording]) -> list[Way]:
     """The recordings with a plane that held its angles and with one that moved, the likelier first.
 
-    As the base equations see them: what is left out may favour the other.
+    As the base equations see them, among waves where there are any: what is left out may favour the other.
     """
     moving = [with_moving_plane(recording) for recording in recordings]
     is_same = all(np.array_equal(a.rudder, b.rudder) for a, b in zip(recordings, moving, strict=True))
     tried = [recordings] if is_same else [recordings, moving]
     fitted = [Way(each, Fitter(excerpt(divide(each).teaching))) for each in tried]
-    return sorted(fitted, key=lambda way: way.fitter.base.bic)
+    fitted.sort(key=lambda way: way.fitter.base.bic)
+    leading, *rest = fitted
+    if (waves := plain_waves(leading.fitter)) is None:
+        return fitted
+    seen = [leading._replace(waves=waves), *(way._replace(waves=plain_waves(way.fitter)) for way in rest)]
+    return sorted(seen, key=lambda way: inf if way.waves is None else way.waves.bic)
 
 
 def is_likelier(other: Way, best: Explanation) -> bool:

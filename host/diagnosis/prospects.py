@@ -17,7 +17,7 @@ from host.gauss_newton import GaussNewton, Point
 from host.output_error import diverges, residuals_at
 from host.propagate import Inputs
 from host.recording import Array
-from host.wave_forces import whitened_among_waves
+from host.waves import whitened_in_waves
 
 if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
@@ -94,7 +94,7 @@ def _whitened(
     """Innovations and sensitivities under the parent's noise, and the deviance: inf if lost."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if parent.fit.waves.any():
-            white = whitened_among_waves(point, inputs)
+            white = whitened_in_waves(point, inputs)
         elif parent.fit.has_process_noise:
             white = whitened_innovations(point, inputs)
         else:

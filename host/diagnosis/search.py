@@ -55,6 +55,7 @@ class Search:
     tried: dict[Names, Explanation] = field(default_factory=dict)
     rivals: set[Names] = field(default_factory=set)
     joint: set[Names] = field(default_factory=set)
+    _singles: list[Explanation] = field(default_factory=list)
     _shrunk: set[Names] = field(default_factory=set)  # those fitted from a larger set
     _polished: set[Names] = field(default_factory=set)  # those of them fitted to the end
 
@@ -70,13 +71,19 @@ class Search:
         for size in range(1, LARGEST_SET + 1):
             if self._needs_many(beam[0], size) and together(self, beam[0]) is not None:
                 break
-            grown = self._grown(beam, size)
+            grown = self.singles() if size == 1 else self._grown(beam, size)
             best_before = min(e.bic for e in beam)
             beam = self._parents(grown)[: BEAM if size == 1 else NARROW]
             if not beam or beam[0].bic > best_before - margin(beam[0]):
                 break
         self.on_progress("settling")
         return completed(self, self._settled(self._retrimmed()))
+
+    def singles(self) -> list[Explanation]:
+        """Each effect alone on top of the root."""
+        if not self._singles:
+            self._singles = self._grown([self.remember(self.root)], 1)
+        return self._singles
 
     def without(self, best: Explanation, name: str) -> Explanation:
         """The set less one member."""

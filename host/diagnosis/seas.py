@@ -1,17 +1,27 @@
 """Searches under random forces: where the sea moves the vehicle, and where it does so with a wave's swing."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from host.catalogue import BY_NAME
 from host.catalogue.environment import WAVE_PERIODS
+from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import SWINGING_MOMENT
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.margins import NAMING_MARGIN
-from host.diagnosis.sea_fits import as_filtered, with_regular_waves, with_sea, with_waves
+from host.diagnosis.explanation import Explanation, Names
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.leftover import Leftover, leftover
+from host.diagnosis.margins import LITTLE, NAMING_MARGIN, margin
+from host.diagnosis.sea_fits import (
+    as_filtered,
+    roughly_with_waves,
+    with_regular_waves,
+    with_sea,
+    with_waves,
+)
 from host.diagnosis.search import Search
-from host.wave_forces import BROADEST
+from host.waves import BROADEST
 
 WAVES = "surface_waves"
 
@@ -30,6 +40,15 @@ class Waves:
     model: Explanation
 
 
+class Explained(NamedTuple):
+    """The best explanation, the search that found it, what it leaves, and the waves it was found among."""
+
+    best: Explanation
+    search: Search
+    left: Leftover
+    waves: Waves | None
+
+
 def in_a_sea(calm: Search, best: Explanation) -> tuple[Search, Explanation]:
     """The search again with random forces, where these explain more than any set of effects alone.
 
@@ -44,6 +63,37 @@ def in_a_sea(calm: Search, best: Explanation) -> tuple[Search, Explanation]:
     rough = Search(fitter, calm.workers, calm.on_progress, with_sea(fitter, calm.base), root, calm.part)
     found = rough.run([also])
     return (rough, found) if found.bic < least else (calm, best)
+
+
+def plain_waves(fitter: Fitter) -> Explanation | None:
+    """The root among waves, where these are likelier than white forces, and those than none."""
+    root = fitter.root
+    if fitter.excess(root.fit) < LITTLE:
+        return None
+    sea = with_sea(fitter, root)
+    if sea.bic > as_filtered(fitter, root).bic - NAMING_MARGIN:
+        return None
+    if roughly_with_waves(fitter, sea).bic > sea.bic - NAMING_MARGIN:
+        return None
+    waves = with_waves(fitter, sea)
+    return waves if _is_sea(waves) else None
+
+
+def in_plain_waves(calm: Search, waves: Explanation) -> Explained | None:
+    """The search among waves that were seen before all else, where they explain more than any effect alone.
+
+    More than a regular swing, too, such as a turning mass has. And where nothing is left then: else what is
+    hidden may only pass for waves.
+    """
+    fitter = calm.fitter
+    swings = calm.workers.results([calm.growth(calm.root, SWINGING_MOMENT.name)])
+    best = min([*calm.singles(), *swings], key=lambda e: e.bic)
+    least = as_filtered(fitter, best).bic
+    if waves.bic > least - NAMING_MARGIN:
+        return None
+    search, found, told = _searched(calm, waves, least)
+    left = leftover(fitter, told.fitted)
+    return Explained(found, search, left, told) if left.is_nothing else None
 
 
 def among_waves(
@@ -69,14 +119,49 @@ def among_waves(
     named = calm.names & BY_NAME.keys() - {WAVES}
     beside = [with_sea(fitter, fitter.reduced(calm, named))] if named - white.names else []
     first = min((with_waves(fitter, one) for one in (white, *beside)), key=lambda e: e.bic)
-    period = 2.0 * np.pi / first.fit.waves[0]
+    first = _lean(fitter, first)
     least = as_filtered(fitter, best).bic
-    is_sea = WAVE_PERIODS[0] < period < WAVE_PERIODS[1] and first.fit.waves[1] < BROADEST
-    if first.bic > least - NAMING_MARGIN or not is_sea:
+    if first.bic > least - NAMING_MARGIN or not _is_sea(first):
         return rough, best, None
-    base, root = (with_waves(fitter, one, first.fit) for one in (rough.base, rough.root))
-    search = Search(fitter, rough.workers, rough.on_progress, base, root, rough.part)
+    return _searched(rough, first, least)
+
+
+def _is_sea(among: Explanation) -> bool:
+    frequency, damping = among.fit.waves[:2]
+    return bool(WAVE_PERIODS[0] < 2.0 * np.pi / frequency < WAVE_PERIODS[1] and damping < BROADEST)
+
+
+def _lean(fitter: Fitter, among: Explanation) -> Explanation:
+    """The set less what does not pay once the waves are estimated without it: they may do its work."""
+    while among.names:
+        fewer = [
+            with_waves(fitter, fitter.reduced(among, among.names - {name})) for name in sorted(among.names)
+        ]
+        best = min(fewer, key=lambda e: e.bic)
+        if best.bic > among.bic + margin(among):
+            break
+        among = best
+    return among
+
+
+def _in_waves_of(fitter: Fitter, first: Explanation, names: Names) -> Explanation:
+    """The base, or the root, in the waves of another explanation and from its parameters."""
+    if names == first.names:
+        return first
+    added = next(iter(names - first.names), None)
+    start = fitter.point(names, first, added, np.zeros(len(FREE_TRIM.parameters)))
+    return fitter.explained(names, fitter.carried_on(start))
+
+
+def _searched(known: Search, first: Explanation, least: float) -> tuple[Search, Explanation, Waves]:
+    """The search in the waves of `first`; `least` is the BIC of the best without waves."""
+    fitter = known.fitter
+    known.on_progress("in the waves")
+    base, root = (_in_waves_of(fitter, first, one.names) for one in (known.base, known.root))
+    search = Search(fitter, known.workers, known.on_progress, base, root, known.part)
     found = search.run([first])
-    fitted = first if found.names == first.names else with_waves(fitter, found)
-    model = with_regular_waves(fitter, fitted, white.fit)
-    return search, found, Waves(delta_bic=least - first.bic, fitted=fitted, model=model)
+    fitted = first if found.names == first.names else _lean(fitter, with_waves(fitter, found))
+    for name in sorted(found.names - fitted.names):
+        found = search.without(found, name)
+    told = Waves(delta_bic=least - first.bic, fitted=fitted, model=with_regular_waves(fitter, fitted))
+    return search, found, told

@@ -18,15 +18,13 @@ from host.diagnosis.prospects import probed
 from host.gauss_newton import Point
 from host.output_error import annealed
 from host.recording import Array
-from host.valleys import A1, A2, A3, B1, B2, USUAL_DAMPING, USUAL_LEVER
+from host.valleys import A2, A3, B2, has_usual_heave, with_usual_heave
 
 if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
 
 FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
 FEW = 1  # members of a set, the free trim among them, that lacks the most
-# 1/s, of a1: a base that lacks an effect may follow its plane at once, or hardly at all.
-INSTANT, IDLE = -10.0, -0.1
 SLUGGISH, USUAL_PITCH_DAMPING = -0.3, -3.0  # 1/s, of a2: a base that lacks a slow plane is a slow hull
 
 
@@ -73,27 +71,6 @@ def guess(fitter: "Fitter", start: Point, names: Names) -> Point:
     values = np.array([rough.get(name, value) for name, value in own])
     point = Point(start.structure, values, start.initial, np.array([*fitter.floor, 0.0, 0.0]))
     return annealed(point, fitter.inputs(names, for_filter=True), fitter.free(names), fitter.accelerations)
-
-
-def has_usual_heave(point: Point) -> bool:
-    """Whether heave neither follows the plane at once nor hardly moves."""
-    return bool(INSTANT < point.parameters[A1] < IDLE)
-
-
-def with_usual_heave(start: Point) -> list[Point]:
-    """Starts with the heave damping of a usual vehicle.
-
-    If heave was fast, with the same steady velocity; if it hardly moved, with a plane that pushes either way.
-    """
-    a1, b1, b2 = start.parameters[[A1, B1, B2]]
-    usual = USUAL_LEVER * b2
-    forces = [b1 * USUAL_DAMPING / a1] if a1 < INSTANT else [usual, -usual]
-    starts = []
-    for force in forces:
-        parameters = start.parameters.copy()
-        parameters[[A1, B1]] = USUAL_DAMPING, force
-        starts.append(replace(start, parameters=parameters))
-    return starts
 
 
 def with_usual_pitch(fitter: "Fitter", parent: Explanation, name: str, values: list[Array]) -> list[Point]:

@@ -43,7 +43,7 @@ def test_one_offset_becomes_another_of_the_same_force_and_moment(fitter: Fitter)
 
 def test_each_offset_is_tried_in_the_place_of_another(fitter: Fitter) -> None:
     with Workers(fitter, 1) as workers:
-        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.trimmed())
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
         best = search.remember(fitter.polished(fitter.grown(fitter.base, "rudder_offset", [])))
         better = exchanged(search, best)
         offsets = ("trim_moment", "pitch_bias", "net_buoyancy", "vertical_current")
@@ -55,7 +55,7 @@ def test_each_offset_is_tried_in_the_place_of_another(fitter: Fitter) -> None:
 
 def test_a_neutral_depth_stands_still_beside_a_free_trim(fitter: Fitter) -> None:
     names = frozenset({FREE_TRIM.name, "depth_dependent_buoyancy"})
-    with_trim = fitter.grown(fitter.trimmed(), "depth_dependent_buoyancy", [])
+    with_trim = fitter.grown(fitter.root, "depth_dependent_buoyancy", [])
     assert fitter.free_parameters(names) == 3
     assert fitter.free_parameters(frozenset({"depth_dependent_buoyancy"})) == 2
     neutral = with_trim.fit.structure.names.index("neutral_depth")

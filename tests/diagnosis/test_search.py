@@ -54,7 +54,7 @@ def test_what_every_vehicle_has_joins_at_once() -> None:
     bent = (names | {"trim_moment", "ballast_change"}) - {"heave_pitch_rate_coupling", "heave_quadratic_drag"}
     wrong = fitted(fitter, bent, true | {"c_q0": 0.0, "c_wb": 0.0, "ballast_time": 60.0})
     with Workers(fitter, 1) as workers:
-        search = Search(fitter, workers, said.append, fitter.base, fitter.trimmed())
+        search = Search(fitter, workers, said.append, fitter.base, fitter.root)
         search.remember(wrong)
         found = completed(search, wrong)
     assert said == ["what every vehicle has beside it"]
@@ -83,7 +83,7 @@ def test_an_effect_that_the_search_passed_over_competes_with_unknown_physics() -
     fitter = Fitter([flown({"c_wq": 0.8, "lag_time": 0.4}, names)])
     half = fitted(fitter, frozenset({"actuator_lag"}), {"lag_time": 0.4})
     with Workers(fitter, 1) as workers:
-        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.trimmed())
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
         search.remember(half)
         assert with_unknown(search, half).names == names
 
@@ -120,7 +120,7 @@ def test_a_member_that_does_not_pay_after_all_is_dropped_at_last() -> None:
     fitter = Fitter([flown(true, names)])
     idle = fitted(fitter, names | {"trim_moment"}, true | {"c_q0": 0.0})
     with Workers(fitter, 1) as workers:
-        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.trimmed())
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
         search.remember(idle)
         found = leanest(search, idle)
         assert found.names == names
@@ -137,7 +137,7 @@ def test_a_set_that_ended_below_its_part_was_never_fitted_beside_it() -> None:
     for joint, is_tried_again in ((poor, True), (replace(poor, fit=likelier), False)):
         said: list[str] = []
         with Workers(fitter, 1) as workers:
-            search = Search(fitter, workers, said.append, fitter.base, fitter.trimmed())
+            search = Search(fitter, workers, said.append, fitter.base, fitter.root)
             search.remember(best)
             search.remember(joint)
             search.joint.add(joint.names)

@@ -1,35 +1,41 @@
 """Waves are named by their swing, and what acts beside them is still found."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hidden_dive import Extra, hidden_dive
 
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.leftover import leftover
 from host.diagnosis.sea_fits import with_sea
 from host.diagnosis.search import Search
-from host.diagnosis.seas import among_waves
+from host.diagnosis.seas import among_waves, in_plain_waves, plain_waves
 from host.diagnosis.workers import Workers
 from host.recording import Array
 
 
-def in_waves(extra: Extra, height: float, swing: float) -> Extra:
-    """The effect, and an irregular sea of twelve waves: m/s^2 and rad/s^2 each."""
+def in_waves(extra: Extra, carried: float, turned: float) -> Extra:
+    """The effect, and an irregular sea of twelve waves: m/s and rad/s^2 each."""
     rng = np.random.default_rng(4)
     met = rng.uniform(0.8, 1.6, 12)  # rad/s
-    phases = rng.uniform(0.0, 2.0 * np.pi, (2, 12))
+    phase = rng.uniform(0.0, 2.0 * np.pi, 12)
 
     def rough(time: float, x: Array, plane: float) -> tuple[float, float, float]:
-        force, moment = np.sin(met * time + phases).sum(axis=1)
         own = extra(time, x, plane)
-        return own[0] + height * force, own[1] + swing * moment, own[2]
+        climb, slope = np.sin(met * time + phase).sum(), np.cos(met * time + phase).sum()
+        return own[0], own[1] - turned * float(slope), own[2] + carried * float(climb)
 
     return rough
 
 
 def test_a_coupling_is_found_among_waves() -> None:
     coupled = in_waves(lambda time, x, plane: (0.8 * x[1], 0.0, 0.0), 0.01, 0.02)  # noqa: ARG005
-    found = diagnose([hidden_dive(coupled, duration=90.0)])
+    said: list[str] = []
+    found = diagnose([hidden_dive(coupled, duration=90.0)], said.append)
+    assert "in the waves" in said  # and nothing else was searched once they were seen
+    assert "random forces" not in said
     names = [effect.name for effect in found.effects]
     assert names.count("surface_waves") == 1
     coupling = next(effect for effect in found.effects if effect.name != "surface_waves")
@@ -42,7 +48,7 @@ def test_waves_are_estimated_beside_what_was_found_without_them(monkeypatch: pyt
     damped = in_waves(lambda time, x, plane: (0.0, -6.0 * x[1] * abs(x[1]), 0.0), 0.01, 0.06)  # noqa: ARG005
     fitter = Fitter([hidden_dive(damped, duration=90.0)])
     calm = fitter.grown(fitter.base, "pitch_quadratic_damping", [])
-    base, root = with_sea(fitter, fitter.base), with_sea(fitter, fitter.trimmed())
+    base, root = with_sea(fitter, fitter.base), with_sea(fitter, fitter.root)
     monkeypatch.setattr(Search, "run", lambda _, also: min(also, key=lambda e: e.bic))
     with Workers(fitter, 1) as workers:
         for known, names in ((fitter.base, set()), (calm, {"pitch_quadratic_damping"})):
@@ -55,10 +61,29 @@ def test_waves_are_estimated_beside_what_was_found_without_them(monkeypatch: pyt
 def test_a_band_broader_than_that_of_any_sea_is_no_waves(monkeypatch: pytest.MonkeyPatch) -> None:
     rough = in_waves(lambda time, x, plane: (0.0, 0.0, 0.0), 0.01, 0.06)  # noqa: ARG005
     fitter = Fitter([hidden_dive(rough, duration=90.0)])
-    base, root = with_sea(fitter, fitter.base), with_sea(fitter, fitter.trimmed())
+    base, root = with_sea(fitter, fitter.base), with_sea(fitter, fitter.root)
     monkeypatch.setattr(Search, "run", lambda _, also: min(also, key=lambda e: e.bic))
     with Workers(fitter, 1) as workers:
         search = Search(fitter, workers, lambda _: None, base, root)
         assert among_waves(search, base, fitter.base)[2] is not None
         monkeypatch.setattr("host.diagnosis.seas.BROADEST", 0.001)
         assert among_waves(search, base, fitter.base)[2] is None
+
+
+def test_what_only_passes_for_waves_is_searched_without_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    rough = in_waves(lambda time, x, plane: (0.0, 0.0, 0.0), 0.02, 0.06)  # noqa: ARG005
+    fitter = Fitter([hidden_dive(rough, duration=60.0)])
+    waves = plain_waves(fitter)
+    assert waves is not None
+    with Workers(fitter, 1) as workers:
+        calm = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        better = replace(fitter.root, bic=waves.bic)
+        monkeypatch.setattr(Search, "singles", lambda _: [better])
+        assert in_plain_waves(calm, waves) is None  # an effect alone explains as much
+        monkeypatch.setattr(Search, "singles", lambda _: [fitter.root])
+        monkeypatch.setattr(Search, "run", lambda _, also: also[0])
+        assert in_plain_waves(calm, waves) is not None
+        coloured = replace(leftover(fitter, waves), is_coloured=True)
+        monkeypatch.setattr("host.diagnosis.seas.leftover", lambda *_: coloured)
+        assert in_plain_waves(calm, waves) is None  # something else is left among them
+    assert plain_waves(Fitter([hidden_dive(duration=60.0)])) is None

@@ -244,7 +244,7 @@ def test_a_slow_plane_is_found_where_the_base_took_it_for_a_slow_hull(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     fitter, name = Fitter([rate_limited(0.0063)]), "actuator_rate_limit"
-    root = fitter.trimmed()
+    root = fitter.root
     assert root.fit.parameters[1] > SLUGGISH
     # From a plane so quick that its limit makes no difference no fit comes back.
     quick = fitter.point(root.names | {name}, root, name, np.array([50.0]))
@@ -257,4 +257,4 @@ def test_a_slow_plane_is_found_where_the_base_took_it_for_a_slow_hull(
 
 def test_a_hull_of_usual_damping_begins_as_it_is() -> None:
     fitter = Fitter([hidden_dive(duration=40.0)])
-    assert with_usual_pitch(fitter, fitter.trimmed(), "actuator_rate_limit", []) == []
+    assert with_usual_pitch(fitter, fitter.root, "actuator_rate_limit", []) == []

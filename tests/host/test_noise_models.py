@@ -14,7 +14,7 @@ from host.maximum_likelihood import fit_maximum_likelihood
 from host.propagate import free_run, inputs_of
 from host.uncertainty import covariance
 from host.vehicle import default_vehicle
-from host.wave_forces import wave_forces_from, whitened_among_waves
+from host.waves import in_waves_from, whitened_in_waves
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 
@@ -131,12 +131,42 @@ def test_waves_are_found_with_their_frequency_and_bias_nothing() -> None:
     # A fit that goes on from there, in the same waves, finds nothing more, and its innovations are the same.
     inputs = [inputs_of(recording)]
     here = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
-    again = wave_forces_from(here, inputs, fit.free, holds_noise=True)
+    again = in_waves_from(here, inputs, fit.free, holds_noise=True)
     np.testing.assert_allclose(again.levels, fit.levels, rtol=1e-12)
     assert again.log_likelihood == pytest.approx(fit.log_likelihood, abs=0.1)
-    white, sensitivity = whitened_among_waves(here, inputs)[0]
+    white, sensitivity = whitened_in_waves(here, inputs)[0]
     np.testing.assert_allclose(white, np.nan_to_num(fit.whitened[0]), atol=1e-9)
     assert sensitivity.shape == (2, fit.parameters.size + 4, recording.time.size)
+
+
+def test_one_wave_in_depth_and_pitch_leaves_speed_and_damping_alone() -> None:
+    recording, _ = fly(Dive(duration=150.0))
+    rng = np.random.default_rng(3)
+    met, phase = rng.uniform(1.0, 1.5, 12), rng.uniform(0.0, 2.0 * np.pi, 12)
+    _, a2, a3, _, _, u0 = TABLE_1.values()
+    q = theta = zeta = 0.0
+    for k in range(recording.time.size):  # the motion that the waves add; small steps, for the hull is linear
+        recording.pitch[k] += theta
+        recording.depth[k] += zeta
+        for h in recording.time[k] + 0.01 * np.arange(10):
+            climb, slope = np.sin(met * h + phase).sum(), np.cos(met * h + phase).sum()
+            q, theta, zeta = (
+                q + 0.01 * (a2 * q + a3 * theta - 0.05 * slope),
+                theta + 0.01 * q,
+                zeta + 0.01 * (0.03 * climb - u0 * theta),
+            )
+    fit = fit_maximum_likelihood([recording])
+    frequency, damping, turn = fit.waves[:3]
+    assert frequency == pytest.approx(1.25, rel=0.1)
+    assert damping < 0.3
+    assert turn == pytest.approx(-0.05 / (0.03 * 1.25), rel=0.15)
+    std = np.sqrt(np.diag(covariance(fit)))
+    assert (np.abs(fit.parameters - TRUTH) < 4.0 * std).all()
+    assert fit.parameters[5] == pytest.approx(u0, rel=0.05)
+    inputs = [inputs_of(recording)]
+    apart = Point(fit.structure, fit.parameters, fit.initial, fit.levels * [1, 1, 1, 1, 0, 1, 1e3])
+    two = in_waves_from(apart, inputs, fit.free, most_steps=1, holds_noise=True)
+    assert two.log_likelihood < fit.log_likelihood - 20.0
 
 
 def test_wandering_is_told_and_kept_in_the_model() -> None:

@@ -1,0 +1,190 @@
+"""Maximum likelihood among waves: water that carries the vehicle up and down, and turns it, as it swings.
+
+    f'' = -2 d s f' - s^2 f + white noise,    g'' likewise
+    zeta' = ... + e f,    q' = ... + e (turn f' + g),    e = exp(-s^2 (zeta - zeta_mean) / g)
+
+with the frequency s at which waves are met, damping d, and what of the moment keeps step with the water's
+slope (turn) estimated, as are the densities that drive f and g (a shaping filter of second order: Fossen,
+Handbook of Marine Craft Hydrodynamics and Motion Control, ch. 8; they decay with depth as in deep water, met
+from the side: Faltinsen, Sea Loads on Ships and Offshore Structures, ch. 2). The velocity f is what pressure
+shows of the water's. One wave does both to depth and pitch: taken for two that know nothing of one another, a
+vehicle that hardly couples the two is likelier than the true one. A filter that takes waves for white forces
+follows the measurements in the wrong band, and its parameters are biased.
+"""
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+
+from host.ascent import ascend, place
+from host.equations import Chain, Effect, Parameter, Structure
+from host.filter_error import RandomForces
+from host.fit import Fit, finished, run_away
+from host.gauss_newton import Mask, Point
+from host.kalman import KalmanPass, kalman_pass
+from host.propagate import Inputs
+from host.recording import Array
+from host.valleys import with_usual_heave
+
+GRAVITY = 9.81
+SLOWEST = 0.2  # rad/s; slower is current
+BROADEST = 0.4  # of a sea: 0.26 fits the waves of a fully developed one, 0.1 those of a young one
+FIRST_DAMPING = 0.1
+FREQUENCIES = np.geomspace(0.3, 4.0, 10)  # rad/s, to begin with; each is within the band of the next
+IN_BAND = 10.0  # times the density of the white forces
+NEAR = 10.0  # of a log-likelihood below the best, from where it is worth going on
+MOST_STEPS = 25
+FIRST_STEPS = 8  # from starts other than the first, of which most lead nowhere
+
+SHAPE = (
+    Parameter(name="wave_frequency", unit="rad/s", lower=SLOWEST, upper=100.0, meaning="of the waves met"),
+    Parameter(name="wave_damping", unit="", lower=0.02, upper=BROADEST, meaning="width of their band"),
+    Parameter(name="wave_turn", unit="1/m", lower=-1e3, upper=1e3, meaning="moment that keeps step"),
+    Parameter(name="wave_depth", unit="m", lower=-1e4, upper=1e5, meaning="where their motion is told"),
+)
+AT_DEPTH = len(SHAPE) - 1
+
+
+def _swing(chain: Chain, name: str) -> None:
+    s, d = chain.p["wave_frequency"], chain.p["wave_damping"]
+    value, rate = chain.extra[name], chain.extra[f"{name}_rate"]
+    chain.rates[name] = rate
+    chain.rates[f"{name}_rate"] = -(s**2) * value - 2.0 * d * s * rate
+
+
+def _reach(chain: Chain) -> ca.SX:
+    return ca.exp(-(chain.p["wave_frequency"] ** 2) / GRAVITY * (chain.zeta - chain.p["wave_depth"]))
+
+
+def _carry(chain: Chain) -> None:
+    reach = _reach(chain)
+    chain.climb += reach * chain.extra["wave"]
+    chain.pitch += reach * chain.p["wave_turn"] * chain.extra["wave_rate"]
+    _swing(chain, "wave")
+
+
+def _turn(chain: Chain) -> None:
+    chain.pitch += _reach(chain) * chain.extra["turning_wave"]
+    _swing(chain, "turning_wave")
+
+
+def _part(state: str, **terms: object) -> Effect:
+    described = {"sentence": "waves carry", "equation": "f'' = -2 d s f' - s^2 f", "manoeuvre": ""}
+    own = {"parameters": (), "probes": (), "initial": lambda _: ca.SX(0)}
+    return Effect(name=state, slot="environment", state=state, **(described | own | terms))  # type: ignore[arg-type]
+
+
+WAVES = (
+    _part("wave", parameters=SHAPE, force=_carry),
+    _part("wave_rate"),
+    _part("turning_wave", force=_turn),
+    _part("turning_wave_rate"),
+)
+
+
+class InWaves(RandomForces):
+    """Levels: variances of pitch, depth; frequency, damping, turn; densities that drive f and g."""
+
+    signed = np.array([False] * 4 + [True] + [False] * 2)
+
+    def __init__(self, inputs: list[Inputs]) -> None:
+        super().__init__(inputs)
+        step = float(np.median(np.concatenate([one.drive[3] for one in inputs])))
+        lower, upper = np.array([[each.lower, each.upper] for each in SHAPE[:AT_DEPTH]]).T
+        upper[0] = 0.7 * np.pi / step
+        self.least = np.array([1e-12, 1e-10, *lower, 1e-16, 1e-16])
+        self.most = np.array([1e3, 1e6, *upper, 1e3, 1e3])
+
+    def passes(self, point: Point) -> list[KalmanPass]:
+        """The Kalman filter over each recording, begun in the middle of a sea."""
+        s, d = point.noise[2:4]
+        states = point.structure.states
+        spread = np.zeros(len(states))
+        for name, density in zip(("wave", "turning_wave"), point.noise[5:], strict=True):
+            spread[states.index(name)] = density / (4.0 * d * s**3)
+            spread[states.index(f"{name}_rate")] = density / (4.0 * d * s)
+        noise = point.noise[[0, 1, 5, 6]]
+        return [
+            kalman_pass(_shaped(point), x0, noise, one, spread)
+            for x0, one in zip(point.initial, self.inputs, strict=True)
+        ]
+
+    def whitened(self, point: Point, passes: list[KalmanPass]) -> list[tuple[Array, Array]]:
+        """Sensitivities at fixed gain."""
+        return super().whitened(replace(point, parameters=_shaped(point)), passes)
+
+
+def in_waves(start: Fit, inputs: list[Inputs], most_steps: int = MOST_STEPS) -> Fit:
+    """Climbs from a fit with white forces to the likeliest parameters, noise and waves.
+
+    Its `noise` keeps the densities of the white forces, which stand for the waves in a predictor.
+    """
+    fit = in_waves_from(_first(start, inputs), inputs, start.free, most_steps)
+    return replace(fit, noise=np.array([*fit.noise[:2], *start.noise[2:]]))
+
+
+def in_waves_from(
+    point: Point, inputs: list[Inputs], free: Mask, most_steps: int = MOST_STEPS, holds_noise: bool = False
+) -> Fit:
+    """The same from any point with waves in its noise (7,); or the parameters alone, in these very waves."""
+    model, wider = _among(point, inputs)
+    wider_free = np.concatenate([free, np.zeros(len(SHAPE), dtype=bool)])
+    best, used, converged = ascend(wider, model, wider_free, most_steps, holds_noise)
+    for other in with_usual_heave(best.point) if most_steps > FIRST_STEPS and not holds_noise else []:
+        there, _, _ = ascend(other, model, wider_free, FIRST_STEPS, holds_noise=True)
+        if there.likelihood > best.likelihood - NEAR:
+            there, more, has_settled = ascend(there.point, model, wider_free, most_steps)
+            if there.likelihood > best.likelihood:
+                best, used, converged = there, used + more, has_settled
+    here = Point(point.structure, best.point.parameters[: free.size], best.point.initial, best.point.noise)
+    if not np.isfinite(best.likelihood):
+        return run_away(here, inputs, free)
+    white = _less_shape(model.whitened(best.point, best.passes), free.size)
+    told = here.with_noise(here.noise[[0, 1, 5, 6]])
+    fit = finished(told, white, inputs, free, best.likelihood, used, converged)
+    return replace(fit, waves=here.noise[2:])
+
+
+def whitened_in_waves(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:
+    """Innovations over their deviation (2, N) and their sensitivities, waves in the point's noise (7,)."""
+    model, wider = _among(point, inputs)
+    return _less_shape(model.whitened(wider, model.passes(wider)), point.parameters.size)
+
+
+def _among(point: Point, inputs: list[Inputs]) -> tuple[InWaves, Point]:
+    """The noise model, and the point with the states and the shape of the waves beside the vehicle's own."""
+    structure = Structure((*point.structure.effects, *WAVES))
+    model = InWaves([replace(one, structure=structure) for one in inputs])
+    shape = np.zeros(len(SHAPE))
+    shape[AT_DEPTH] = np.mean([np.mean(one.measured[1][one.present[1] > 0.0]) for one in inputs])
+    levels = np.clip(point.noise, model.least, model.most)
+    return model, Point(structure, np.concatenate([point.parameters, shape]), point.initial, levels)
+
+
+def _shaped(point: Point) -> Array:
+    """The parameters with the shape of the waves that the noise levels tell."""
+    parameters = point.parameters.copy()
+    parameters[-len(SHAPE) : -1] = point.noise[2:5]
+    return parameters
+
+
+def _less_shape(white: list[tuple[Array, Array]], count: int) -> list[tuple[Array, Array]]:
+    """Without the sensitivities by the waves' own shape, which follow those of the vehicle."""
+    return [(e, np.delete(S, range(count, count + len(SHAPE)), axis=1)) for e, S in white]
+
+
+def _first(start: Fit, inputs: list[Inputs]) -> Point:
+    """White forces told as waves of the frequency that suits best."""
+    d, points = FIRST_DAMPING, []
+    for s in FREQUENCIES:
+        # In their band they push harder than white forces, which push everywhere; climb swings with w' / s.
+        driving = IN_BAND * start.noise[2:] * 4.0 * d**2 * s**4 / np.array([s**2, 1.0])
+        levels = np.array([*start.noise[:2], s, d, 0.0, *driving])
+        points.append(Point(start.structure, start.parameters, start.initial, levels))
+    return max(points, key=lambda point: _likelihood(point, inputs))
+
+
+def _likelihood(point: Point, inputs: list[Inputs]) -> float:
+    model, wider = _among(point, inputs)
+    return place(wider, model).likelihood
