@@ -110,7 +110,9 @@ def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], 
         fitter = Fitter(spans.teaching)
     with Workers(fitter, jobs) as workers:
         explained = _explain(fitter, workers, on_progress, part, plain if part is None else None)
-        again = next((other for other in others if is_likelier(other, explained.best)), None)
+        again = next(
+            (other for other in others if is_likelier(other, explained.search, explained.best)), None
+        )
         if again is None:
             judged = _judge(explained, spans, floor, on_progress)
     if again is not None:

@@ -5,13 +5,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import NAMING_MARGIN
+from host.diagnosis.search import Search
 from host.diagnosis.seas import plain_waves
 from host.diagnosis.spans import divide, excerpt
 from host.plane_between_rows import with_moving_plane
 from host.recording import Recording
+
+CONTENDERS = 10  # sets that are tried with the plane the other way
 
 
 class Way(NamedTuple):
@@ -42,7 +46,17 @@ def ways(recordings: list[Recording]) -> list[Way]:
     return sorted(seen, key=lambda way: inf if way.waves is None else way.waves.bic)
 
 
-def is_likelier(other: Way, best: Explanation) -> bool:
-    """Whether an explanation fits the recordings clearly better with the plane the other way."""
-    again = Fitter(divide(other.recordings).teaching, known=best).polished(best)
-    return again.bic < best.bic - NAMING_MARGIN
+def is_likelier(other: Way, search: Search, best: Explanation) -> bool:
+    """Whether the recordings are explained clearly better with the plane the other way.
+
+    By the same set, or by another that came close: taken the wrong way, the plane is made up for by what is
+    not there, and what is there falls behind.
+    """
+    fitter = Fitter(divide(other.recordings).teaching, known=best)
+    bare = ((e.names - {FREE_TRIM.name}, e) for e in sorted(search.tried.values(), key=lambda e: e.bic))
+    close = {best.names: best}
+    for names, explanation in bare:
+        if len(close) < CONTENDERS:
+            close.setdefault(names, explanation)
+    least = best.bic - NAMING_MARGIN
+    return any(fitter.reduced(explanation, names).bic < least for names, explanation in close.items())

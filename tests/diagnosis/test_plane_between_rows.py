@@ -14,6 +14,8 @@ from host.diagnosis.diagnose import diagnose
 from host.diagnosis.files import write_extended_model
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.plane_choice import is_likelier, ways
+from host.diagnosis.search import Search
+from host.diagnosis.workers import Workers
 from host.equations import NAMES
 from host.errors import RecordingError
 from host.identify import identify
@@ -61,6 +63,10 @@ def dive(way: Way) -> Recording:
     )
 
 
+def searched(fitter: Fitter) -> Search:
+    return Search(fitter, Workers(fitter, 1), lambda _: None, fitter.base, fitter.root)
+
+
 def test_a_plane_that_moves_on_is_taken_at_its_mean_and_a_step_stays_a_step() -> None:
     swinging = dive("moving")
     mean = np.array([plane(np.linspace(t, t + STEP, 21)).mean() for t in swinging.time])
@@ -78,8 +84,21 @@ def test_what_the_plane_did_is_read_off_the_motion(way: Way) -> None:
     recording = dive(way)
     first, second = ways([recording])
     assert (NOTE in first.recordings[0].notes) == (way == "moving")
-    assert is_likelier(first, second.fitter.base)
-    assert not is_likelier(second, first.fitter.base)
+    assert is_likelier(first, searched(second.fitter), second.fitter.base)
+    assert not is_likelier(second, searched(first.fitter), first.fitter.base)
+
+
+def test_a_set_that_came_close_may_speak_for_the_other_way() -> None:
+    right, wrong = ways([dive("moving")])
+    least = right.fitter.base.bic
+    idle = right.fitter.grown(right.fitter.base, "munk_moment", []).bic
+    assert idle > least
+    # So good that it would not do better the other way, but the base would.
+    best = replace(wrong.fitter.grown(wrong.fitter.base, "munk_moment", []), bic=0.5 * (least + idle) + 6.0)
+    search = searched(wrong.fitter)
+    assert not is_likelier(right, search, best)
+    search.remember(wrong.fitter.root)
+    assert is_likelier(right, search, best)
 
 
 @pytest.mark.parametrize("way", ["held", "moving"])
