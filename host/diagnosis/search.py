@@ -24,6 +24,7 @@ from host.diagnosis.pruning import pruned
 from host.diagnosis.together import completed, together
 from host.diagnosis.workers import Task, Workers
 from host.recording import Array
+from host.whiteness import is_even, is_white
 
 BEAM = 4  # single effects carried on
 FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
@@ -74,6 +75,10 @@ class Search:
             grown = self.singles() if size == 1 else self._grown(beam, size)
             best_before = min(e.bic for e in beam)
             beam = self._parents(grown)[: BEAM if size == 1 else NARROW]
+            if size == 1 and beam and self.fitter.excess(beam[0].fit) > LITTLE:
+                beam = self._with_offset(beam)
+            if beam and self._leaves_nothing(beam[0]):
+                del beam[1:]  # whatever grows from the others is not likelier
             if not beam or beam[0].bic > best_before - margin(beam[0]):
                 break
         self.on_progress("settling")
@@ -257,6 +262,19 @@ class Search:
             if best.bic < leading.bic + margin(leading):
                 break
         return best
+
+    def _leaves_nothing(self, leading: Explanation) -> bool:
+        white = all(is_white(e) and is_even(e) for e in leading.fit.whitened)
+        return white and self.fitter.excess(leading.fit) < LITTLE
+
+    def _with_offset(self, beam: list[Explanation]) -> list[Explanation]:
+        """The beam, before it a set with an offset that explains more than the free trim in its place.
+
+        At a speed that changes no constant force does what a bias of the pitch sensor or a current does.
+        """
+        tasks = [("retrimmed", (e, frozenset({name}))) for e in beam[:NARROW] for name in OFFSETS]
+        best = min((self.remember(e) for e in self.workers.results(tasks)), key=lambda e: e.bic)
+        return [best, *beam[: BEAM - 1]] if best.bic < beam[0].bic - margin(beam[0]) else beam
 
     def _has_idle_member(self, explanation: Explanation) -> bool:
         """Whether a smaller set does better; if as well only, the free trim may do a part of the work."""
