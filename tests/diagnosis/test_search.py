@@ -11,6 +11,7 @@ from host.catalogue import CATALOGUE, ORDINARY, structure_of
 from host.diagnosis.charges import LONELY, RARITY
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.margins import LITTLE
 from host.diagnosis.pruning import leanest, pruned
 from host.diagnosis.search import Search
 from host.diagnosis.together import completed, together, with_ordinary
@@ -143,3 +144,19 @@ def test_a_set_that_ended_below_its_part_was_never_fitted_beside_it() -> None:
             search.joint.add(joint.names)
             assert completed(search, best).names == names
         assert bool(said) == is_tried_again
+
+
+def test_an_offset_joins_a_speed_that_changes_and_what_it_leaves_is_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    said: list[str] = []
+    names = frozenset({"speed_loss", "pitch_bias"})
+    fitter = Fitter([flown({"c_ud": 4.0, "speed_time": 15.0, "pitch_zero": 0.05}, names)])
+    losing, late = (fitter.grown(fitter.root, name, []) for name in ("speed_loss", "actuator_lag"))
+    assert fitter.excess(losing.fit) > LITTLE  # a constant force is no bias of a sensor at such a speed
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, said.append, fitter.base, fitter.root)
+        monkeypatch.setattr(Search, "singles", lambda _: [losing, late])
+        assert search.run().names == names
+    grown = [line for line in said if line.startswith("2 effects")]
+    assert all("pitch_bias" in line for line in grown)
