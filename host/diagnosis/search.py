@@ -187,7 +187,10 @@ class Search:
         labels = [" + ".join(sorted(names)) for names in tasks]
 
         def say(number: int) -> None:
-            self.on_progress(f"{size} effect{'s' * (size > 1)}, {number + 1}/{len(labels)}: {labels[number]}")
+            count = len(list(tasks)[number] - {FREE_TRIM.name})
+            self.on_progress(
+                f"{count} effect{'s' * (count > 1)}, {number + 1}/{len(labels)}: {labels[number]}"
+            )
 
         found = self.workers.results(list(tasks.values()), say)
         return [self.remember(explanation) for explanation in found]

@@ -158,5 +158,6 @@ def test_an_offset_joins_a_speed_that_changes_and_what_it_leaves_is_nothing(
         search = Search(fitter, workers, said.append, fitter.base, fitter.root)
         monkeypatch.setattr(Search, "singles", lambda _: [losing, late])
         assert search.run().names == names
-    grown = [line for line in said if line.startswith("2 effects")]
-    assert all("pitch_bias" in line for line in grown)
+    assert said.pop() == "settling"
+    assert said  # what remains is tried beside both, and nothing beside less
+    assert all(line.startswith("3 effects") and "pitch_bias + " in line for line in said)
