@@ -177,8 +177,6 @@ def _explain(
     """
     known = None if part is None else part.search
     search = Search(fitter, workers, on_progress, fitter.base, fitter.root, known)
-    if waves is not None and (explained := in_plain_waves(search, waves)) is not None:
-        return explained
     best = search.run([] if part is None else [fitter.refitted(part.best)])
     left, told = leftover(fitter, best), None
     if best.names or not left.is_nothing:
@@ -187,6 +185,8 @@ def _explain(
     may_be_sea = part is None or part.best.fit.has_process_noise
     if may_be_sea and (unknown_in(best) or not left.is_nothing):
         calm = best
+        if waves is not None and (explained := in_plain_waves(search, best, waves)) is not None:
+            return explained
         search, best = in_a_sea(search, best)
         if part is None or part.waves is not None:
             search, best, told = among_waves(search, best, calm)

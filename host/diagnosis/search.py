@@ -56,7 +56,6 @@ class Search:
     tried: dict[Names, Explanation] = field(default_factory=dict)
     rivals: set[Names] = field(default_factory=set)
     joint: set[Names] = field(default_factory=set)
-    _singles: list[Explanation] = field(default_factory=list)
     _shrunk: set[Names] = field(default_factory=set)  # those fitted from a larger set
     _polished: set[Names] = field(default_factory=set)  # those of them fitted to the end
 
@@ -86,9 +85,7 @@ class Search:
 
     def singles(self) -> list[Explanation]:
         """Each effect alone on top of the root."""
-        if not self._singles:
-            self._singles = self._grown([self.remember(self.root)], 1)
-        return self._singles
+        return self._grown([self.remember(self.root)], 1)
 
     def without(self, best: Explanation, name: str) -> Explanation:
         """The set less one member."""

@@ -79,20 +79,16 @@ def plain_waves(fitter: Fitter) -> Explanation | None:
     return waves if _is_sea(waves) else None
 
 
-def in_plain_waves(calm: Search, waves: Explanation) -> Explained | None:
-    """The search among waves that were seen before all else, where they explain more than any effect alone.
+def in_plain_waves(calm: Search, best: Explanation, waves: Explanation) -> Explained | None:
+    """The search among waves that were plain to see, where they explain more than the best without them.
 
-    More than a regular swing, too, such as a turning mass has. And where nothing is left then: else what is
-    hidden may only pass for waves.
+    And where nothing is left then: else what is hidden may only pass for waves.
     """
-    fitter = calm.fitter
-    swings = calm.workers.results([calm.growth(calm.root, SWINGING_MOMENT.name)])
-    best = min([*calm.singles(), *swings], key=lambda e: e.bic)
-    least = as_filtered(fitter, best).bic
+    least = as_filtered(calm.fitter, best).bic
     if waves.bic > least - NAMING_MARGIN:
         return None
     search, found, told = _searched(calm, waves, least)
-    left = leftover(fitter, told.fitted)
+    left = leftover(calm.fitter, told.fitted)
     return Explained(found, search, left, told) if left.is_nothing else None
 
 

@@ -34,7 +34,7 @@ def test_a_coupling_is_found_among_waves() -> None:
     coupled = in_waves(lambda time, x, plane: (0.8 * x[1], 0.0, 0.0), 0.01, 0.02)  # noqa: ARG005
     said: list[str] = []
     found = diagnose([hidden_dive(coupled, duration=90.0)], said.append)
-    assert "in the waves" in said  # and nothing else was searched once they were seen
+    assert "in the waves" in said  # which were plain to see: not among white forces first
     assert "random forces" not in said
     names = [effect.name for effect in found.effects]
     assert names.count("surface_waves") == 1
@@ -70,7 +70,7 @@ def test_a_band_broader_than_that_of_any_sea_is_no_waves(monkeypatch: pytest.Mon
         assert among_waves(search, base, fitter.base)[2] is None
 
 
-def test_what_only_passes_for_waves_is_searched_without_them(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_only_passes_for_waves_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     rough = in_waves(lambda time, x, plane: (0.0, 0.0, 0.0), 0.02, 0.06)  # noqa: ARG005
     fitter = Fitter([hidden_dive(rough, duration=60.0)])
     waves = plain_waves(fitter)
@@ -78,12 +78,10 @@ def test_what_only_passes_for_waves_is_searched_without_them(monkeypatch: pytest
     with Workers(fitter, 1) as workers:
         calm = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
         better = replace(fitter.root, bic=waves.bic)
-        monkeypatch.setattr(Search, "singles", lambda _: [better])
-        assert in_plain_waves(calm, waves) is None  # an effect alone explains as much
-        monkeypatch.setattr(Search, "singles", lambda _: [fitter.root])
+        assert in_plain_waves(calm, better, waves) is None  # what acts without waves explains as much
         monkeypatch.setattr(Search, "run", lambda _, also: also[0])
-        assert in_plain_waves(calm, waves) is not None
+        assert in_plain_waves(calm, fitter.root, waves) is not None
         coloured = replace(leftover(fitter, waves), is_coloured=True)
         monkeypatch.setattr("host.diagnosis.seas.leftover", lambda *_: coloured)
-        assert in_plain_waves(calm, waves) is None  # something else is left among them
+        assert in_plain_waves(calm, fitter.root, waves) is None  # something else is left among them
     assert plain_waves(Fitter([hidden_dive(duration=60.0)])) is None
