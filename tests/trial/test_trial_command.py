@@ -21,11 +21,17 @@ def test_a_small_trial_runs_and_is_taken_up_again(tmp_path: Path, capsys: pytest
     assert said.index("answers sealed") < said.index("answers opened")
     assert main(words) in (0, 1)
     assert json.loads((tmp_path / "trial.json").read_text()) == first
-    words[4] = "1"
-    assert main(words) in (0, 1)
-    assert json.loads((tmp_path / "trial.json").read_text())["recordings"] == 1
+    whole = {one["recording"] for one in first["judged"]}
+    parts = []
+    for limits in (["--count", "1"], ["--count", "2", "--first", "2"]):
+        assert main([*words[:3], *limits, *words[5:]]) in (0, 1)
+        (part,) = json.loads((tmp_path / "trial.json").read_text())["judged"]
+        parts.append(part["recording"])
+    assert whole == {*parts}
 
 
 def test_nonsense_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["blind-trial", "--out", str(tmp_path), "--count", "0"]) == 2
     assert capsys.readouterr().err.startswith("mils: --count")
+    assert main(["blind-trial", "--out", str(tmp_path), "--count", "3", "--first", "4"]) == 2
+    assert capsys.readouterr().err == "mils: --first must be 1 to 3, the --count\n"

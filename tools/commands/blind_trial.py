@@ -19,6 +19,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="recordings (default 300); of a trial with more, the first N",
     )
+    parser.add_argument(
+        "--first", type=int, default=1, metavar="N", help="the first that is diagnosed and scored"
+    )
     parser.add_argument("--seed", type=int, help="repeats a trial; without it nobody knows the answers")
     parser.add_argument(
         "--usual", action="store_true", help="every vehicle also has what real ones have: drag, a lag, ..."
@@ -45,6 +48,10 @@ def run(args: argparse.Namespace) -> int:
     if args.count < 1 or args.jobs < 1:
         print("mils: --count and --jobs must be at least 1", file=sys.stderr)
         return 2
+    if not 1 <= args.first <= args.count:
+        print(f"mils: --first must be 1 to {args.count}, the --count", file=sys.stderr)
+        return 2
+    chosen = slice(args.first - 1, args.count)
     with stages(args.quiet) as stage:
         digest = published(folder)
         if digest is None:
@@ -52,12 +59,12 @@ def run(args: argparse.Namespace) -> int:
             with stage("drawing vehicles", args.count) as step:
                 digest = write_trial(folder, seed, args.count, args.jobs, step, args.usual)
         print(f"answers sealed: SHA-256 {digest}  {folder / SEALED}", flush=True)
-        paths = recordings(folder)[: args.count]
+        paths = recordings(folder)[chosen]
         with stage("diagnosing", len(paths)) as step:
             runs = diagnose_all(folder, paths, args.jobs, step)
     try:
         seed, answers = open_answers(folder, digest)
-        answers = answers[: args.count]
+        answers = answers[chosen]
     except BrokenSeal as error:
         print(f"mils: {error}", file=sys.stderr)
         return 2
