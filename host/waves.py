@@ -18,6 +18,7 @@ import casadi as ca
 import numpy as np
 
 from host.ascent import ascend, place
+from host.catalogue.gravity import GRAVITY
 from host.equations import Chain, Effect, Parameter, Structure
 from host.filter_error import RandomForces
 from host.fit import Fit, finished, run_away
@@ -27,7 +28,6 @@ from host.propagate import Inputs
 from host.recording import Array
 from host.valleys import with_usual_heave
 
-GRAVITY = 9.81
 SLOWEST = 0.2  # rad/s; slower is current
 BROADEST = 0.4  # of a sea: 0.26 fits the waves of a fully developed one, 0.1 those of a young one
 FIRST_DAMPING = 0.1
