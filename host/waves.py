@@ -13,6 +13,7 @@ follows the measurements in the wrong band, and its parameters are biased.
 """
 
 from dataclasses import replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -69,10 +70,10 @@ def _turn(chain: Chain) -> None:
     _swing(chain, "turning_wave")
 
 
-def _part(state: str, **terms: object) -> Effect:
+def _part(state: str, **terms: Any) -> Effect:
     described = {"sentence": "waves carry", "equation": "f'' = -2 d s f' - s^2 f", "manoeuvre": ""}
-    own = {"parameters": (), "probes": (), "initial": lambda _: ca.SX(0)}
-    return Effect(name=state, slot="environment", state=state, **(described | own | terms))  # type: ignore[arg-type]
+    own: dict[str, Any] = {"parameters": (), "probes": (), "initial": lambda _: ca.SX(0)}
+    return Effect(name=state, slot="environment", state=state, **(described | own | terms))
 
 
 WAVES = (
@@ -127,7 +128,10 @@ def in_waves(start: Fit, inputs: list[Inputs], most_steps: int = MOST_STEPS) -> 
 def in_waves_from(
     point: Point, inputs: list[Inputs], free: Mask, most_steps: int = MOST_STEPS, holds_noise: bool = False
 ) -> Fit:
-    """The same from any point with waves in its noise (7,); or the parameters alone, in these very waves."""
+    """The same from any point with waves in its noise (7,); or the parameters alone, in these very waves.
+
+    A full climb goes from another heave damping, too: waves hide which valley is the vehicle's.
+    """
     model, wider = _among(point, inputs)
     wider_free = np.concatenate([free, np.zeros(len(SHAPE), dtype=bool)])
     best, used, converged = ascend(wider, model, wider_free, most_steps, holds_noise)

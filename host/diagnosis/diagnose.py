@@ -161,8 +161,8 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
         effects.append(NamedEffect(name=WAVES, delta_bic=waves.delta_bic))
     effects.sort(key=lambda effect: -effect.delta_bic)
     # The very waves that were met are chance, and the regular one in their place may come out of step.
-    calm = after if waves is None else misfit(waves.fitted, spans, floor)
-    verdict = verdict_on(model, left, before, calm)
+    without_it = after if waves is None else misfit(waves.fitted, spans, floor)
+    verdict = verdict_on(model, left, before, without_it)
     return Judged(before, after, effects, verdict, _slots(search, best, effects, verdict))
 
 

@@ -15,13 +15,7 @@ from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations
 from host.diagnosis.prospects import form_gains, gain
 from host.diagnosis.spans import ALARM_LATE
-from host.diagnosis.starts import (
-    guess,
-    idle,
-    is_far,
-    starts_of,
-    with_usual_pitch,
-)
+from host.diagnosis.starts import guess, idle, is_far, starts_of, with_usual_pitch
 from host.diagnosis.trims import HELD, retrimmed, trimmed
 from host.equations import NAMES, Effect
 from host.filter_error import filter_error_from

@@ -181,13 +181,12 @@ class Search:
         for parent in parents:
             for name in self._promising(parent, size, parent is parents[0]):
                 tasks.setdefault(parent.names | {name}, self.growth(parent, name))
-        labels = [" + ".join(sorted(names)) for names in tasks]
+        sets = list(tasks)
 
         def say(number: int) -> None:
-            count = len(list(tasks)[number] - {FREE_TRIM.name})
-            self.on_progress(
-                f"{count} effect{'s' * (count > 1)}, {number + 1}/{len(labels)}: {labels[number]}"
-            )
+            names = sets[number]
+            count, label = len(names - {FREE_TRIM.name}), " + ".join(sorted(names))
+            self.on_progress(f"{count} effect{'s' * (count > 1)}, {number + 1}/{len(sets)}: {label}")
 
         found = self.workers.results(list(tasks.values()), say)
         return [self.remember(explanation) for explanation in found]

@@ -115,8 +115,9 @@ def among_waves(
     named = calm.names & BY_NAME.keys() - {WAVES}
     beside = [with_sea(fitter, fitter.reduced(calm, named))] if named - white.names else []
     first = min((with_waves(fitter, one) for one in (white, *beside)), key=lambda e: e.bic)
-    first = _lean(fitter, first)
-    least = as_filtered(fitter, best).bic
+    if not _is_sea(first):
+        return rough, best, None
+    first, least = _lean(fitter, first), as_filtered(fitter, best).bic
     if first.bic > least - NAMING_MARGIN or not _is_sea(first):
         return rough, best, None
     return _searched(rough, first, least)

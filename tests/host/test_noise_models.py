@@ -1,5 +1,7 @@
 """The noise models of the bench against dense algebra, and against recordings made to mistake them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from exact_dive import TABLE_1, Dive, fly
@@ -14,7 +16,7 @@ from host.maximum_likelihood import fit_maximum_likelihood
 from host.propagate import free_run, inputs_of
 from host.uncertainty import covariance
 from host.vehicle import default_vehicle
-from host.waves import in_waves_from, whitened_in_waves
+from host.waves import SHAPE, in_waves_from, whitened_in_waves
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 
@@ -139,7 +141,7 @@ def test_waves_are_found_with_their_frequency_and_bias_nothing() -> None:
     assert sensitivity.shape == (2, fit.parameters.size + 4, recording.time.size)
 
 
-def test_one_wave_in_depth_and_pitch_leaves_speed_and_damping_alone() -> None:
+def test_one_wave_in_depth_and_pitch_leaves_speed_and_damping_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     recording, _ = fly(Dive(duration=150.0))
     rng = np.random.default_rng(3)
     met, phase = rng.uniform(1.0, 1.5, 12), rng.uniform(0.0, 2.0 * np.pi, 12)
@@ -163,9 +165,13 @@ def test_one_wave_in_depth_and_pitch_leaves_speed_and_damping_alone() -> None:
     std = np.sqrt(np.diag(covariance(fit)))
     assert (np.abs(fit.parameters - TRUTH) < 4.0 * std).all()
     assert fit.parameters[5] == pytest.approx(u0, rel=0.05)
-    inputs = [inputs_of(recording)]
-    apart = Point(fit.structure, fit.parameters, fit.initial, fit.levels * [1, 1, 1, 1, 0, 1, 1e3])
-    two = in_waves_from(apart, inputs, fit.free, most_steps=1, holds_noise=True)
+    # Two waves that know nothing of one another, as likely as can be, are less likely than the one.
+    unknown = [replace(each, lower=0.0, upper=0.0) if each.name == "wave_turn" else each for each in SHAPE]
+    monkeypatch.setattr("host.waves.SHAPE", tuple(unknown))
+    turning = fit.levels[5] * (frequency * turn) ** 2
+    apart = Point(fit.structure, fit.parameters, fit.initial, np.array([*fit.levels[:6], turning]))
+    two = in_waves_from(apart, [inputs_of(recording)], fit.free)
+    assert two.waves[2] == 0.0
     assert two.log_likelihood < fit.log_likelihood - 20.0
 
 

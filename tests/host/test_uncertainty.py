@@ -42,6 +42,14 @@ def test_white_noise_whose_variance_comes_and_goes_is_white_and_what_it_hides_is
     assert not is_even(white + 0.3 * np.sin(np.arange(2000) / 300.0))
 
 
+def test_correlations_up_to_the_slack_are_let_pass_and_no_larger_ones() -> None:
+    noise = np.random.default_rng(3).standard_normal((1, 20000))
+    slight, more = (np.asarray(lfilter([1.0, c], [1.0], noise)) for c in (0.04, 0.15))
+    assert not is_white(slight)
+    assert is_white(slight, slack=0.05)
+    assert not is_white(more, slack=0.05)
+
+
 def test_gaps_do_not_colour_white_noise() -> None:
     rng = np.random.default_rng(2)
     rejected = 0

@@ -28,6 +28,9 @@ def test_a_small_trial_runs_and_is_taken_up_again(tmp_path: Path, capsys: pytest
         (part,) = json.loads((tmp_path / "trial.json").read_text())["judged"]
         parts.append(part["recording"])
     assert whole == {*parts}
+    capsys.readouterr()
+    assert main([*words[:3], "--count", "9", "--first", "3", *words[5:]]) == 2
+    assert capsys.readouterr().err == f"mils: {tmp_path} holds 2 recordings: --first must be 1 to 2\n"
 
 
 def test_nonsense_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

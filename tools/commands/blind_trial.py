@@ -60,6 +60,10 @@ def run(args: argparse.Namespace) -> int:
                 digest = write_trial(folder, seed, args.count, args.jobs, step, args.usual)
         print(f"answers sealed: SHA-256 {digest}  {folder / SEALED}", flush=True)
         paths = recordings(folder)[chosen]
+        if not paths:
+            drawn = len(recordings(folder))
+            print(f"mils: {folder} holds {drawn} recordings: --first must be 1 to {drawn}", file=sys.stderr)
+            return 2
         with stage("diagnosing", len(paths)) as step:
             runs = diagnose_all(folder, paths, args.jobs, step)
     try:
