@@ -16,9 +16,9 @@ from host.diagnosis.locate import Location, locate
 from host.diagnosis.plane_choice import Way, is_likelier, ways
 from host.diagnosis.pruning import leanest
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
-from host.diagnosis.sea_fits import with_sea
+from host.diagnosis.sea_fits import WAVES, again_in_waves, with_regular_waves, with_sea
 from host.diagnosis.search import Search
-from host.diagnosis.seas import WAVES, Explained, among_waves, in_a_sea, in_plain_waves
+from host.diagnosis.seas import Explained, among_waves, in_a_sea, in_plain_waves
 from host.diagnosis.spans import Spans, divide, excerpt
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.unknown_physics import known_in, unknown_in, with_unknown
@@ -119,16 +119,18 @@ def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], 
         on_progress("the plane between rows")
         return _diagnosed(again, [], on_progress, jobs)
     best, search, left, waves = explained
-    model = best if waves is None else waves.model
-    has_sea = best.fit.has_process_noise
     on_progress("final fit on everything")
-    base, extended = _refitted(search.base, recordings), _refitted(model, recordings)
+    base = _refitted(search.base, recordings)
+    found = extended = _refitted(best if waves is None else waves.fitted, recordings)
     longest = max(recordings, key=lambda recording: recording.duration)
-    std = deviations(extended, longest)
+    std = deviations(found, longest)
+    if waves is not None:
+        extended = with_regular_waves(Fitter(recordings, known=found), found)
+        std = deviations(extended, longest) | std
     values = dict(zip(extended.fit.structure.names, extended.fit.parameters.tolist(), strict=True))
     effects = [_with_coefficients(effect, values, std) for effect in judged.effects]
     errors = free_run_errors(base, longest)
-    told = remaining(judged.verdict, model, left, judged.after)
+    told = remaining(judged.verdict, best, left, judged.after)
     return Diagnosis(
         verdict=judged.verdict,
         recordings=recordings,
@@ -143,8 +145,8 @@ def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], 
         location=locate(longest, errors, floor, values["u0"]),
         force=unknown_force(longest, {n: values[n] for n in NAMES}, floor, fitter.accelerations),
         ranking=_ranking(search),
-        remaining=" ".join([told, *_other_answers(extended)]),
-        has_sea=has_sea,
+        remaining=" ".join([told, *_other_answers(found)]),
+        has_sea=best.fit.has_process_noise,
         bic=best.bic,
         std=std,
     )
@@ -224,6 +226,8 @@ def _with_coefficients(effect: NamedEffect, values: dict[str, float], std: dict[
 def _refitted(explanation: Explanation, recordings: list[Recording]) -> Explanation:
     """The set fitted to all stretches, teaching and judging, for the model that is handed back."""
     fitter = Fitter(recordings, known=explanation)
+    if explanation.fit.waves.any():
+        return again_in_waves(fitter, explanation)
     again = fitter.across(fitter.refitted(explanation))
     return with_sea(fitter, again) if explanation.fit.has_process_noise else again
 

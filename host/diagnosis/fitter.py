@@ -182,6 +182,20 @@ class Fitter:
 
     def refitted(self, explanation: Explanation) -> Explanation:
         """A set fitted to other stretches, fitted to these."""
+        start = self.begun(explanation)
+        fit = self.fitted([start])
+        if self.excess(fit) > NOT_THERE * self.excess(explanation.fit):
+            inputs = self.inputs(explanation.names, for_filter=True)
+            moved = annealed(start, inputs, fit.free, self.accelerations)
+            fit = self.fitted([start, moved])
+        return self.polished(self.explained(explanation.names, fit), EXACT)
+
+    def begun(self, explanation: Explanation) -> Point:
+        """What was fitted to other stretches, with the initial states of these, all coefficients held.
+
+        Until those are found coefficients would run away: a moment would go beyond the recordings, where it
+        makes no difference any more, and never come back.
+        """
         structure, values = structure_of(explanation.names), explanation.fit.parameters.copy()
         for name, value in self.held.items():
             if name in structure.names:
@@ -190,22 +204,9 @@ class Fitter:
             np.array([0.0, 0.0, _first(recording.pitch), _first(recording.depth)])
             for recording in self.recordings
         ]
-        start = self._begun(Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0])))
-        fit = self.fitted([start])
-        if self.excess(fit) > NOT_THERE * self.excess(explanation.fit):
-            inputs = self.inputs(explanation.names, for_filter=True)
-            moved = annealed(start, inputs, fit.free, self.accelerations)
-            fit = self.fitted([start, moved])
-        return self.polished(self.explained(explanation.names, fit), EXACT)
-
-    def _begun(self, start: Point) -> Point:
-        """The point with its initial states found, all coefficients held: until then those would run away.
-
-        A moment would go beyond the recordings, where it makes no difference any more, and never come back.
-        """
-        inputs = self.inputs(frozenset(effect.name for effect in start.structure.effects))
-        held = np.zeros(start.parameters.size, dtype=bool)
-        fit = output_error(start, inputs, held, FIRST_ITERATIONS, TOLERANCE)
+        start = Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0]))
+        held = np.zeros(values.size, dtype=bool)
+        fit = output_error(start, self.inputs(explanation.names), held, FIRST_ITERATIONS, TOLERANCE)
         return Point(fit.structure, fit.parameters, fit.initial, fit.noise)
 
     def free(self, names: Names) -> Mask:

@@ -4,15 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from host.diagnosis.explanation import Explanation
+from host.catalogue import named
+from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.filter_error import filter_error
 from host.fit import Fit
 from host.gauss_newton import Point
 from host.output_error import output_error
+from host.recording import Array
 from host.waves import in_waves, in_waves_from
 
+WAVES = "surface_waves"
 FEW_STEPS = 4
+BAND, LINES = 2.0, 21  # half-widths of the waves' band, and regular waves tried in it
 
 
 def with_sea(fitter: Fitter, explanation: Explanation) -> Explanation:
@@ -54,11 +58,33 @@ def with_waves(fitter: Fitter, explanation: Explanation, waves: Fit | None = Non
     return fitter.explained(explanation.names, climbed)
 
 
+def again_in_waves(fitter: Fitter, explanation: Explanation) -> Explanation:
+    """A set that was fitted among waves to other stretches, fitted to these in the same waves."""
+    start = fitter.begun(explanation).with_noise(explanation.fit.levels)
+    return fitter.explained(explanation.names, fitter.carried_on(start))
+
+
 def with_regular_waves(fitter: Fitter, explanation: Explanation) -> Explanation:
-    """A set found among waves with the regular wave nearest to them, and white forces."""
-    fit = explanation.fit
-    calm = replace(fit, noise=np.array([*fit.noise[:2], 0.0, 0.0]), waves=np.zeros(5))
-    plain = with_sea(fitter, fitter.explained(explanation.names, calm))
-    if "surface_waves" in plain.names:
-        return plain
-    return fitter.grown(plain, "surface_waves", [np.array([0.0, 0.0, 2.0 * np.pi / fit.waves[0]])])
+    """A set found among waves with the regular wave nearest to them, and white forces, to be simulated.
+
+    A free run tells its size, phase and period, all else held: fitted with the rest, one regular wave would
+    bend the vehicle to what the other waves do.
+    """
+    frequency, damping = explanation.fit.waves[:2]
+    names = explanation.names | {WAVES}
+    inputs = fitter.inputs(names)
+    periods = 2.0 * np.pi / (frequency * np.linspace(1.0 - BAND * damping, 1.0 + BAND * damping, LINES))
+    probes = [np.array([0.0, 0.0, period]) for period in periods]
+    starts = [fitter.point(names, explanation, WAVES, probe) for probe in probes]
+    own = np.isin(starts[0].structure.names, [each.name for each in named(WAVES).parameters])
+    fits = [output_error(start, inputs, own, FEW_STEPS) for start in starts]
+    best = max(fits, key=lambda fit: fit.log_likelihood)
+    point = Point(best.structure, best.parameters, best.initial, best.noise)
+    regular = output_error(point, inputs, own)
+    return fitter.explained(names, replace(regular, noise=_levels(fitter, names, regular)))
+
+
+def _levels(fitter: Fitter, names: Names, fit: Fit) -> Array:
+    """The noise of a predictor with these parameters under white forces."""
+    held = replace(fit, free=np.zeros_like(fit.free))
+    return filter_error(held, fitter.inputs(names, for_filter=True)).noise

@@ -14,6 +14,7 @@ from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import Leftover, leftover
 from host.diagnosis.margins import LITTLE, NAMING_MARGIN, margin
 from host.diagnosis.sea_fits import (
+    WAVES,
     as_filtered,
     roughly_with_waves,
     with_regular_waves,
@@ -22,8 +23,6 @@ from host.diagnosis.sea_fits import (
 )
 from host.diagnosis.search import Search
 from host.waves import BROADEST
-
-WAVES = "surface_waves"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
