@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import isfinite
-from typing import Literal
+from math import inf, isfinite
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -55,6 +55,23 @@ class Identification:
     history: dict[str, Array] | None
 
 
+class Learnt(NamedTuple):
+    """A model, the fit that made it, and the estimates over time, as far as the method has them."""
+
+    model: VehicleModel
+    fit: Fit | None
+    history: dict[str, Array] | None
+
+    @property
+    def has_waves(self) -> bool:
+        return self.fit is not None and bool(self.fit.waves.any())
+
+    @property
+    def bic(self) -> float:
+        """Of the fit; infinite without one."""
+        return inf if self.fit is None else self.fit.bic
+
+
 def identify(
     recordings: list[Recording],
     vehicle: Vehicle,
@@ -67,10 +84,15 @@ def identify(
     the plane held its angles between rows or moved on; for the others, which a vehicle runs on its own
     commands, it held them.
     """
-    recordings = without_outliers(recordings)
+    recordings, others = without_outliers(recordings), []
     if method == "ml":
-        recordings = _likelier_between_rows(recordings, on_progress)
-    model, fit, history = _learn(recordings, vehicle, method, on_progress)
+        recordings, *others = _between_rows(recordings, on_progress)
+    model, fit, history = learnt = _learn(recordings, vehicle, method, on_progress)
+    for other in others if learnt.has_waves else []:
+        # Waves hide from a free run what the plane did.
+        again = _learn(other, vehicle, method, on_progress)
+        if again.bic < learnt.bic - CLEARLY:
+            recordings, (model, fit, history) = other, again
     held_out = None
     if sum(recording.duration for recording in recordings) >= SHORTEST_TO_SPLIT:
         on_progress("held-out check")
@@ -88,21 +110,19 @@ def identify(
     )
 
 
-def _likelier_between_rows(recordings: list[Recording], on_progress: Progress) -> list[Recording]:
-    """The recordings with the plane taken to hold its angles, or clearly likelier to move on evenly."""
+def _between_rows(recordings: list[Recording], on_progress: Progress) -> list[list[Recording]]:
+    """The recordings with the plane taken to hold its angles, and to move on evenly: the likelier first."""
     moving = [with_moving_plane(recording) for recording in recordings]
     if all(np.array_equal(a.rudder, b.rudder) for a, b in zip(recordings, moving, strict=True)):
-        return recordings
+        return [recordings]
     on_progress("the plane between rows")
     held_bic, moving_bic = (
         fit_maximum_likelihood(each, noise_model="output_error").bic for each in (recordings, moving)
     )
-    return moving if moving_bic < held_bic - CLEARLY else recordings
+    return [moving, recordings] if moving_bic < held_bic - CLEARLY else [recordings, moving]
 
 
-def _learn(
-    recordings: list[Recording], vehicle: Vehicle, method: Method, on_progress: Progress
-) -> tuple[VehicleModel, Fit | None, dict[str, Array] | None]:
+def _learn(recordings: list[Recording], vehicle: Vehicle, method: Method, on_progress: Progress) -> Learnt:
     if method == "ml":
         fit = fit_maximum_likelihood(recordings, on_progress=on_progress)
         std = np.sqrt(np.diag(covariance(fit)))
@@ -110,17 +130,18 @@ def _learn(
         values = dict(zip(NAMES, fit.parameters.tolist(), strict=True))
         deviations = dict(zip(NAMES, std.tolist(), strict=True))
         model = model_of(recordings, vehicle.name, method, values, deviations, fit.noise, wander=fit.wander)
-        return model, fit, None
+        return Learnt(model, fit, None)
     on_progress("sample by sample" if method == "robust" else "regression on CAR rows")
     if method == "car":
         values, stds = car_least_squares(recordings, vehicle)
-        return model_of(recordings, vehicle.name, method, values, stds), None, None
+        return Learnt(model_of(recordings, vehicle.name, method, values, stds), None, None)
     values, stds, history = run_estimator(recordings, vehicle, method)
     effects = None
     if "c_wq" in values:
         c_wq = {"value": values.pop("c_wq"), "std": stds.pop("c_wq"), "unit": "m/s"}
         effects = [{"name": "heave_pitch_rate_coupling", "parameters": {"c_wq": c_wq}}]
-    return model_of(recordings, vehicle.name, method, values, stds, effects=effects), None, history
+    model = model_of(recordings, vehicle.name, method, values, stds, effects=effects)
+    return Learnt(model, None, history)
 
 
 def _held_out(recordings: list[Recording], vehicle: Vehicle, method: Method) -> list[Prediction] | None:

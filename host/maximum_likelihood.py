@@ -25,7 +25,7 @@ from host.rounding import thinned
 from host.speed_error import speed_error
 from host.start_values import start_values
 from host.valleys import are_apart, other_valleys, plausibility, with_rivals
-from host.waves import in_waves
+from host.waves import in_waves, in_waves_from, is_sea
 from host.whiteness import is_white
 
 NoiseModel = Literal["auto", "output_error", "filter_error"]
@@ -108,14 +108,15 @@ def _noise_models(start: Fit, inputs: list[Inputs]) -> Iterator[Fit]:
     filtered = filter_error(start, inputs)
     yield filtered
     yield coloured_noise(start, inputs)
-    if filtered.bic < start.bic:
-        yield in_waves(filtered, inputs)
+    if filtered.bic < start.bic and is_sea(waves := in_waves(filtered, inputs)):
+        yield waves
 
 
 def _like(chosen: Fit, start: Fit, inputs: list[Inputs]) -> Fit:
     """Another end under the noise model that was chosen."""
     if chosen.waves.any():
-        return in_waves(filter_error(start, inputs), inputs)
+        point = Point(start.structure, start.parameters, start.initial, chosen.levels)
+        return in_waves_from(point, inputs, start.free, holds_noise=True)
     if chosen.has_process_noise:
         return filter_error(start, inputs)
     return coloured_noise(start, inputs) if chosen.has_coloured_noise else start

@@ -1,15 +1,17 @@
 """Maximum likelihood among waves: water that carries the vehicle up and down, and turns it, as it swings.
 
     f'' = -2 d s f' - s^2 f + white noise,    g'' likewise
-    zeta' = ... + e f,    q' = ... + e (turn f' + g),    e = exp(-s^2 (zeta - zeta_mean) / g)
+    zeta' = ... + e f,    q' = a2 (q - e (turn f' + g)) + ...,    e = exp(-s^2 (zeta - zeta_mean) / g)
 
-with the frequency s at which waves are met, damping d, and what of the moment keeps step with the water's
+with the frequency s at which waves are met, damping d, and what of the water's rotation keeps step with its
 slope (turn) estimated, as are the densities that drive f and g (a shaping filter of second order: Fossen,
 Handbook of Marine Craft Hydrodynamics and Motion Control, ch. 8; they decay with depth as in deep water, met
 from the side: Faltinsen, Sea Loads on Ships and Offshore Structures, ch. 2). The velocity f is what pressure
 shows of the water's. One wave does both to depth and pitch: taken for two that know nothing of one another, a
 vehicle that hardly couples the two is likelier than the true one. A filter that takes waves for white forces
-follows the measurements in the wrong band, and its parameters are biased.
+follows the measurements in the wrong band, and its parameters are biased. As the water turns the vehicle by
+its pitch damping, rotation and not moment is estimated: a moment would have to grow with a2, a3 and b2 where
+only their ratios are well known, and few steps would not get there.
 """
 
 from dataclasses import replace
@@ -19,6 +21,7 @@ import casadi as ca
 import numpy as np
 
 from host.ascent import ascend, place
+from host.catalogue.environment import WAVE_PERIODS
 from host.catalogue.gravity import GRAVITY
 from host.equations import Chain, Effect, Parameter, Structure
 from host.filter_error import RandomForces
@@ -27,21 +30,21 @@ from host.gauss_newton import Mask, Point
 from host.kalman import KalmanPass, kalman_pass
 from host.propagate import Inputs
 from host.recording import Array
-from host.valleys import with_usual_heave
+from host.valleys import A2, with_usual_heave
 
 SLOWEST = 0.2  # rad/s; slower is current
 BROADEST = 0.4  # of a sea: 0.26 fits the waves of a fully developed one, 0.1 those of a young one
 FIRST_DAMPING = 0.1
 FREQUENCIES = np.geomspace(0.3, 4.0, 10)  # rad/s, to begin with; each is within the band of the next
 IN_BAND = 10.0  # times the density of the white forces
-NEAR = 10.0  # of a log-likelihood below the best, from where it is worth going on
+NEAR = 100.0  # of a log-likelihood below the best, in the same waves, from where it is worth going on
 MOST_STEPS = 25
 FIRST_STEPS = 8  # from starts other than the first, of which most lead nowhere
 
 SHAPE = (
     Parameter(name="wave_frequency", unit="rad/s", lower=SLOWEST, upper=100.0, meaning="of the waves met"),
     Parameter(name="wave_damping", unit="", lower=0.02, upper=BROADEST, meaning="width of their band"),
-    Parameter(name="wave_turn", unit="1/m", lower=-1e3, upper=1e3, meaning="moment that keeps step"),
+    Parameter(name="wave_turn", unit="s/m", lower=-1e3, upper=1e3, meaning="rotation that keeps step"),
     Parameter(name="wave_depth", unit="m", lower=-1e4, upper=1e5, meaning="where their motion is told"),
 )
 AT_DEPTH = len(SHAPE) - 1
@@ -61,12 +64,12 @@ def _reach(chain: Chain) -> ca.SX:
 def _carry(chain: Chain) -> None:
     reach = _reach(chain)
     chain.climb += reach * chain.extra["wave"]
-    chain.pitch += reach * chain.p["wave_turn"] * chain.extra["wave_rate"]
+    chain.pitch -= reach * chain.p["a2"] * chain.p["wave_turn"] * chain.extra["wave_rate"]
     _swing(chain, "wave")
 
 
 def _turn(chain: Chain) -> None:
-    chain.pitch += _reach(chain) * chain.extra["turning_wave"]
+    chain.pitch -= _reach(chain) * chain.p["a2"] * chain.extra["turning_wave"]
     _swing(chain, "turning_wave")
 
 
@@ -135,12 +138,14 @@ def in_waves_from(
     model, wider = _among(point, inputs)
     wider_free = np.concatenate([free, np.zeros(len(SHAPE), dtype=bool)])
     best, used, converged = ascend(wider, model, wider_free, most_steps, holds_noise)
-    for other in with_usual_heave(best.point) if most_steps > FIRST_STEPS and not holds_noise else []:
-        there, _, _ = ascend(other, model, wider_free, FIRST_STEPS, holds_noise=True)
-        if there.likelihood > best.likelihood - NEAR:
-            there, more, has_settled = ascend(there.point, model, wider_free, most_steps)
-            if there.likelihood > best.likelihood:
-                best, used, converged = there, used + more, has_settled
+    if most_steps > FIRST_STEPS and not holds_noise:
+        starts = with_usual_heave(best.point)
+        ends = [ascend(start, model, wider_free, FIRST_STEPS, holds_noise=True)[0] for start in starts]
+        other = max(ends, key=lambda end: end.likelihood)
+        if other.likelihood > best.likelihood - NEAR:
+            other, more, has_settled = ascend(other.point, model, wider_free, most_steps)
+            if other.likelihood > best.likelihood:
+                best, used, converged = other, used + more, has_settled
     here = Point(point.structure, best.point.parameters[: free.size], best.point.initial, best.point.noise)
     if not np.isfinite(best.likelihood):
         return run_away(here, inputs, free)
@@ -148,6 +153,12 @@ def in_waves_from(
     told = here.with_noise(here.noise[[0, 1, 5, 6]])
     fit = finished(told, white, inputs, free, best.likelihood, used, converged)
     return replace(fit, waves=here.noise[2:])
+
+
+def is_sea(fit: Fit) -> bool:
+    """Whether a fit's waves have a period of surface waves, in a band no broader than a sea's."""
+    frequency, damping = fit.waves[:2]
+    return bool(WAVE_PERIODS[0] < 2.0 * np.pi / frequency < WAVE_PERIODS[1] and damping < BROADEST)
 
 
 def whitened_in_waves(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:
@@ -183,7 +194,7 @@ def _first(start: Fit, inputs: list[Inputs]) -> Point:
     d, points = FIRST_DAMPING, []
     for s in FREQUENCIES:
         # In their band they push harder than white forces, which push everywhere; climb swings with w' / s.
-        driving = IN_BAND * start.noise[2:] * 4.0 * d**2 * s**4 / np.array([s**2, 1.0])
+        driving = IN_BAND * start.noise[2:] * 4.0 * d**2 * s**4 / np.array([s**2, start.parameters[A2] ** 2])
         levels = np.array([*start.noise[:2], s, d, 0.0, *driving])
         points.append(Point(start.structure, start.parameters, start.initial, levels))
     return max(points, key=lambda point: _likelihood(point, inputs))

@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from host.catalogue import BY_NAME
-from host.catalogue.environment import WAVE_PERIODS
 from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import SWINGING_MOMENT
 from host.diagnosis.explanation import Explanation, Names
@@ -22,7 +21,7 @@ from host.diagnosis.sea_fits import (
     with_waves,
 )
 from host.diagnosis.search import Search
-from host.waves import BROADEST
+from host.waves import is_sea
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,7 +74,7 @@ def plain_waves(fitter: Fitter) -> Explanation | None:
     if roughly_with_waves(fitter, sea).bic > sea.bic - NAMING_MARGIN:
         return None
     waves = with_waves(fitter, sea)
-    return waves if _is_sea(waves) else None
+    return waves if is_sea(waves.fit) else None
 
 
 def in_plain_waves(calm: Search, best: Explanation, waves: Explanation) -> Explained | None:
@@ -114,17 +113,12 @@ def among_waves(
     named = calm.names & BY_NAME.keys() - {WAVES}
     beside = [with_sea(fitter, fitter.reduced(calm, named))] if named - white.names else []
     first = min((with_waves(fitter, one) for one in (white, *beside)), key=lambda e: e.bic)
-    if not _is_sea(first):
+    if not is_sea(first.fit):
         return rough, best, None
     first, least = _lean(fitter, first), as_filtered(fitter, best).bic
-    if first.bic > least - NAMING_MARGIN or not _is_sea(first):
+    if first.bic > least - NAMING_MARGIN or not is_sea(first.fit):
         return rough, best, None
     return _searched(rough, first, least)
-
-
-def _is_sea(among: Explanation) -> bool:
-    frequency, damping = among.fit.waves[:2]
-    return bool(WAVE_PERIODS[0] < 2.0 * np.pi / frequency < WAVE_PERIODS[1] and damping < BROADEST)
 
 
 def _lean(fitter: Fitter, among: Explanation) -> Explanation:

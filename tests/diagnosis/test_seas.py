@@ -66,7 +66,7 @@ def test_a_band_broader_than_that_of_any_sea_is_no_waves(monkeypatch: pytest.Mon
     with Workers(fitter, 1) as workers:
         search = Search(fitter, workers, lambda _: None, base, root)
         assert among_waves(search, base, fitter.base)[2] is not None
-        monkeypatch.setattr("host.diagnosis.seas.BROADEST", 0.001)
+        monkeypatch.setattr("host.waves.BROADEST", 0.001)
         assert among_waves(search, base, fitter.base)[2] is None
 
 

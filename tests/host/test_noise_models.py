@@ -16,7 +16,7 @@ from host.maximum_likelihood import fit_maximum_likelihood
 from host.propagate import free_run, inputs_of
 from host.uncertainty import covariance
 from host.vehicle import default_vehicle
-from host.waves import SHAPE, in_waves_from, whitened_in_waves
+from host.waves import SHAPE, in_waves_from, is_sea, whitened_in_waves
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 
@@ -132,6 +132,9 @@ def test_waves_are_found_with_their_frequency_and_bias_nothing() -> None:
     assert (np.abs(fit.parameters - TRUTH) < 4.0 * std).all()
     # A fit that goes on from there, in the same waves, finds nothing more, and its innovations are the same.
     inputs = [inputs_of(recording)]
+    assert is_sea(fit)
+    for broad_or_slow in ([1.0, 0.4], [0.3, 0.1], [4.0, 0.1]):
+        assert not is_sea(replace(fit, waves=np.array([*broad_or_slow, 0.0, 1.0, 1.0])))
     here = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
     again = in_waves_from(here, inputs, fit.free, holds_noise=True)
     np.testing.assert_allclose(again.levels, fit.levels, rtol=1e-12)
@@ -161,7 +164,7 @@ def test_one_wave_in_depth_and_pitch_leaves_speed_and_damping_alone(monkeypatch:
     frequency, damping, turn = fit.waves[:3]
     assert frequency == pytest.approx(1.25, rel=0.1)
     assert damping < 0.3
-    assert turn == pytest.approx(-0.05 / (0.03 * 1.25), rel=0.15)
+    assert turn == pytest.approx(-0.05 / (0.03 * 1.25) / -a2, rel=0.15)
     std = np.sqrt(np.diag(covariance(fit)))
     assert (np.abs(fit.parameters - TRUTH) < 4.0 * std).all()
     assert fit.parameters[5] == pytest.approx(u0, rel=0.05)
