@@ -26,14 +26,23 @@ RUNAWAY = 1e7  # of a sensitivity, in SI: the model leaves the recording exponen
 USUAL_DURATION = 300.0  # s; over longer ones sensitivities may be larger
 LOST = 1e12  # rad^2, m^2: a run that leaves the recording needs no likelihood of its rounding
 PROMISED = 10.0  # times the tolerance: what an undamped step may promise where nothing more is gained
+QUICKER = 3.0  # times the pace of its last step, that a search may still gain
 LEAST_DAMPING = 1e-9  # once a step was refused: curved valleys are far narrower than they are long
 ANNEALING = (0.1, 0.01, 1e-3, 1e-4)  # s, variance of the unknown force over that of all force
 
 
 def output_error(
-    start: Point, inputs: list[Inputs], free: Mask, most_iterations: int = 40, tolerance: float = 1e-3
+    start: Point,
+    inputs: list[Inputs],
+    free: Mask,
+    most_iterations: int = 40,
+    tolerance: float = 1e-3,
+    least: float = -np.inf,
 ) -> Fit:
-    """Gauss-Newton on the free run, the noise variances concentrated out; ends at a gain below tolerance."""
+    """Gauss-Newton on the free run, the noise variances concentrated out; ends at a gain below tolerance.
+
+    least  a log-likelihood: it gives up where it would not get there at some times the pace of its last step
+    """
     point, damping, converged, iterations = start, 1e-3, False, 0
     runs = _free_runs(point, inputs)
     noise, cost = _likeliest_noise(_errors(runs, inputs), inputs)
@@ -54,10 +63,13 @@ def output_error(
             converged = True
             break
         # In a curved valley steps are short, and gain little, while much is left to gain.
-        converged = cost - trial_cost < tolerance and step.promise() < PROMISED * tolerance
+        gained = cost - trial_cost
+        converged = gained < tolerance and step.promise() < PROMISED * tolerance
         cost, point, noise = trial_cost, trial, trial_noise
         parts = _innovations(point, runs, inputs)
         damping = damping / 10.0
+        if -cost + QUICKER * gained * (most_iterations - iterations) < least:
+            break
     point = point.with_noise(np.concatenate([noise, [0.0, 0.0]]))
     white = _whitened_by(noise, parts, inputs)
     deviance = _deviance(noise, parts, white, inputs)

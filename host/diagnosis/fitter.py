@@ -45,7 +45,8 @@ FIRST_ITERATIONS, MOST_ITERATIONS, TOLERANCE = 4, 25, 0.2
 PATIENT_ITERATIONS = 20  # from a point of another valley, which may lie far up its side
 EXACT, SETTLED = 1e-3, 0.005  # of a log-likelihood, that an iteration of a polished fit may still gain
 NOT_THERE = 1.2  # times the sensor noise that the set left elsewhere: it has ended in another valley
-HOPELESS = 0.1  # of a log-likelihood per sample
+HOPELESS = 0.1  # of a log-likelihood per sample: a few iterations hardly lead to more
+MADE_UP_FOR = 20.0  # of a log-likelihood, by fewer parameters or more usual ones
 ROUGHLY = 1.0  # of a log-likelihood: a set does at least as well as with one member less
 
 
@@ -105,7 +106,7 @@ class Fitter:
         return trimmed(self)
 
     def retrimmed(self, explanation: Explanation, offsets: Names) -> Explanation:
-        return retrimmed(self, explanation, offsets, hopeless(explanation.fit))
+        return retrimmed(self, explanation, offsets)
 
     def excess(self, fit: Fit) -> float:
         """Sensor noise of a fit over the noise floor, in the worse channel: 1 where nothing is left."""
@@ -132,7 +133,7 @@ class Fitter:
         if not has_usual_heave(end):
             again += with_usual_heave(end)
         again += with_usual_pitch(self, parent, name, values)
-        others = [self.fitted([start], hopeless(fit), PATIENT_ITERATIONS) for start in again]
+        others = [self.fitted([start], fit, PATIENT_ITERATIONS) for start in again]
         fit = max([fit, *others], key=plausibility)
         if named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
             fit = self.fitted([idle(starts[0], name)])
@@ -255,19 +256,21 @@ class Fitter:
         structure = structure_of(names)
         return Point(structure, np.array([known[name] for name in structure.names]), fit.initial, fit.levels)
 
-    def fitted(self, starts: list[Point], least: float = -np.inf, first: int = FIRST_ITERATIONS) -> Fit:
-        """Goes a few steps from every start, and on from the best where that is at least so likely."""
+    def fitted(self, starts: list[Point], rival: Fit | None = None, first: int = FIRST_ITERATIONS) -> Fit:
+        """Goes `first` steps from every start, and on from the best where it may get as far as the rival."""
         structure = starts[0].structure
         names = frozenset(effect.name for effect in structure.effects)
         inputs, free = self.inputs(names), self.free(names)
         if starts[0].noise[2:].any():
             return self._under_forces(starts[0], holds_noise=True)
-        fits = [output_error(start, inputs, free, first, TOLERANCE) for start in starts]
+        least = -np.inf if rival is None else rival.log_likelihood
+        hopeless = least - (0.0 if rival is None else HOPELESS * rival.samples)
+        fits = [output_error(start, inputs, free, first, TOLERANCE, hopeless) for start in starts]
         best = max(fits, key=lambda fit: fit.log_likelihood)
-        if best.log_likelihood < least:
+        if best.log_likelihood < hopeless:
             return best
         on = Point(structure, best.parameters, best.initial, best.noise)
-        return output_error(on, inputs, free, MOST_ITERATIONS, TOLERANCE)
+        return output_error(on, inputs, free, MOST_ITERATIONS, TOLERANCE, least - MADE_UP_FOR)
 
     def carried_on(self, start: Point, tolerance: float = SETTLED) -> Fit:
         """A fit from this point to its end, under random forces or waves where the point has them."""
@@ -286,11 +289,6 @@ class Fitter:
         if start.noise.size > 4:
             return in_waves_from(start, inputs, free, holds_noise=True)
         return filter_error_from(start, inputs, free, holds_noise=holds_noise)
-
-
-def hopeless(rival: Fit) -> float:
-    """The log-likelihood below which a few iterations from elsewhere hardly lead to more than the rival's."""
-    return rival.log_likelihood - HOPELESS * rival.samples
 
 
 def _first(values: Array) -> float:

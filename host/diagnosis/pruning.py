@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from host.catalogue import named
 from host.diagnosis.absence import one_step_without
-from host.diagnosis.explanation import Explanation
+from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.margins import LARGEST_SET, ROUGH, SMALL, margin
 
 if TYPE_CHECKING:
@@ -31,6 +31,8 @@ def pruned(search: "Search", explanation: Explanation) -> Explanation:
         # What is clearly needed beside others is needed without them.
         doubtful = {smaller[names] for names in smaller if search.tried[names].bic < limit + ROUGH}
         best = min((search.tried[names] for names in smaller), key=lambda e: e.bic)
+        if best.bic < explanation.bic and len(explanation.names) > LARGEST_SET:
+            best = _without_the_willing(search, explanation, smaller) or best
         if best.bic > limit and len(explanation.names) > SMALL and len(doubtful) > 1:
             best = _without_two(search, explanation, sorted(doubtful))
         if best.bic > limit:
@@ -40,6 +42,29 @@ def pruned(search: "Search", explanation: Explanation) -> Explanation:
     if explanation is not given:
         search.polish([explanation.names])
     return search.tried.get(explanation.names, explanation)
+
+
+def _without_the_willing(
+    search: "Search", explanation: Explanation, smaller: dict[Names, str]
+) -> Explanation | None:
+    """A large set less all, or the first half of all, that improve it by going alone.
+
+    None where two of them do each other's work: without both more is lost than without the one and the other.
+    """
+    alone = {member: search.tried[names] for names, member in smaller.items()}
+    willing = [name for name in alone if alone[name].bic < explanation.bic]
+    willing.sort(key=lambda name: alone[name].bic)
+    lost = {name: max(0.0, _lost(explanation, alone[name])) for name in willing}
+    while len(willing) > 1:
+        fewer = search.without_all(explanation, willing)
+        if _lost(explanation, fewer) < sum(lost[name] for name in willing) + margin(explanation):
+            return fewer
+        del willing[(len(willing) + 1) // 2 :]
+    return None
+
+
+def _lost(explanation: Explanation, fewer: Explanation) -> float:
+    return 2.0 * (explanation.fit.log_likelihood - fewer.fit.log_likelihood)
 
 
 def leanest(search: "Search", explanation: Explanation) -> Explanation:

@@ -37,12 +37,10 @@ def trimmed(fitter: "Fitter") -> Explanation:
     return fitter.explained(names, best)
 
 
-def retrimmed(fitter: "Fitter", explanation: Explanation, offsets: Names, least: float) -> Explanation:
+def retrimmed(fitter: "Fitter", explanation: Explanation, offsets: Names) -> Explanation:
     """The same set with some of the catalogue's offsets in place of those it has, or of the free trim.
 
     Not polished: most of the offsets that are tried explain nothing.
-
-    least  the log-likelihood from which on its fit is worth going on with
     """
     names = (explanation.names - {FREE_TRIM.name, *OFFSETS}) | offsets
     fit = explanation.fit
@@ -59,4 +57,4 @@ def retrimmed(fitter: "Fitter", explanation: Explanation, offsets: Names, least:
     structure = structure_of(names)
     parameters = np.array([known[name] for name in structure.names])
     start = Point(structure, parameters, fit.initial, fit.levels)
-    return fitter.explained(names, fitter.fitted([start], least))
+    return fitter.explained(names, fitter.fitted([start], explanation.fit))

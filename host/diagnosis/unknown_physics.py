@@ -9,7 +9,7 @@ the search found grows further only in competition with these forms.
 from host.catalogue import BY_NAME, UNKNOWN
 from host.diagnosis.exchange import exchanged
 from host.diagnosis.explanation import Explanation
-from host.diagnosis.margins import FEW, LARGEST_SET, NAMING_MARGIN, SMALL, margin
+from host.diagnosis.margins import FEW, LARGEST_SET, LITTLE, NAMING_MARGIN, SMALL, margin
 from host.diagnosis.pruning import pruned
 from host.diagnosis.search import Search
 from host.diagnosis.together import completed
@@ -34,9 +34,14 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
     if not _is_large(best):
         return best
     best = pruned(search, best)
-    if search.part is not None or search.is_hopeless(best):
+    if search.part is not None or search.is_hopeless(best) or _is_left_open(search, best):
         return best
     return exchanged(search, completed(search, best))
+
+
+def _is_left_open(search: Search, best: Explanation) -> bool:
+    """Whether a form of unknown physics is needed and is not enough: then no exchange makes names certain."""
+    return bool(best.names & UNKNOWN.keys()) and search.fitter.excess(best.fit) > LITTLE
 
 
 def _rounds(search: Search, best: Explanation) -> int:
