@@ -56,3 +56,22 @@ def test_where_the_fit_without_all_of_them_is_worse_fewer_go(
         search = search_of(fitter, workers)
         joint = with_ordinary(search, fitter.grown(fitter.base, "heave_pitch_rate_coupling", []))
         assert pruned(search, joint).names >= TRUE
+
+
+@pytest.mark.parametrize("are_needed_together", [False, True])
+def test_what_improves_it_by_going_alone_goes_at_once_unless_two_do_the_same_work(
+    fitter: Fitter, monkeypatch: pytest.MonkeyPatch, are_needed_together: bool
+) -> None:
+    monkeypatch.setattr("host.diagnosis.pruning._without_the_idle", lambda _, explanation: explanation)
+    if are_needed_together:
+        monkeypatch.setattr(
+            "host.diagnosis.pruning._lost", lambda whole, fewer: 100.0 * (len(whole.names - fewer.names) > 1)
+        )
+    fitted = []
+    with Workers(fitter, 1) as workers:
+        search = search_of(fitter, workers)
+        joint = with_ordinary(search, fitter.grown(fitter.base, "heave_pitch_rate_coupling", []))
+        shrink = Search.shrink
+        monkeypatch.setattr(Search, "shrink", lambda *given: fitted.append(len(given[2])) or shrink(*given))
+        assert pruned(search, joint).names == TRUE
+    assert (sum(fitted) > 30) == are_needed_together
