@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from host.catalogue import BY_NAME, UNKNOWN, named
+from host.diagnosis.deviations import deviations
 from host.diagnosis.exchange import twins
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
@@ -29,7 +30,6 @@ from host.identifiability import ambiguity
 from host.noise_floor import noise_floor
 from host.outliers import without_outliers
 from host.recording import Array, Recording
-from host.uncertainty import covariance
 
 MOST_WORTH = 1e9  # of BIC: without some effects the equations run away
 SLOTS: tuple[Slot, ...] = ("heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment")
@@ -122,11 +122,12 @@ def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], 
     on_progress("final fit on everything")
     base = _refitted(search.base, recordings)
     found = extended = _refitted(best if waves is None else waves.fitted, recordings)
-    longest = max(recordings, key=lambda recording: recording.duration)
-    std = deviations(found, longest)
+    whole = Fitter(recordings, known=found)
+    std = deviations(whole, found)
     if waves is not None:
-        extended = with_regular_waves(Fitter(recordings, known=found), found)
-        std = deviations(extended, longest) | std
+        extended = with_regular_waves(whole, found)
+        std = deviations(whole, extended) | std
+    longest = max(recordings, key=lambda recording: recording.duration)
     values = dict(zip(extended.fit.structure.names, extended.fit.parameters.tolist(), strict=True))
     effects = [_with_coefficients(effect, values, std) for effect in judged.effects]
     errors = free_run_errors(base, longest)
@@ -230,18 +231,6 @@ def _refitted(explanation: Explanation, recordings: list[Recording]) -> Explanat
         return again_in_waves(fitter, explanation)
     again = fitter.across(fitter.refitted(explanation))
     return with_sea(fitter, again) if explanation.fit.has_process_noise else again
-
-
-def deviations(extended: Explanation, longest: Recording) -> dict[str, float]:
-    """Standard deviations of all coefficients by name, those of moments within the recording.
-
-    While the plane rests nothing tells when its effect changed; but a moment drawn anywhere in the recording
-    would deviate by no more than duration / sqrt(12).
-    """
-    structure = extended.fit.structure
-    std = dict(zip(structure.names, np.sqrt(np.diag(covariance(extended.fit))).tolist(), strict=True))
-    most = longest.duration / np.sqrt(12.0)
-    return std | {name: min(std[name], most) for name in structure.moments}
 
 
 def _slots(

@@ -15,7 +15,7 @@ from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations
 from host.diagnosis.prospects import form_gains, gain
 from host.diagnosis.spans import ALARM_LATE
-from host.diagnosis.starts import guess, idle, is_far, starts_of, with_usual_pitch
+from host.diagnosis.starts import guess, idle, is_far, scanned, starts_of, with_usual_pitch
 from host.diagnosis.trims import HELD, retrimmed, trimmed
 from host.equations import NAMES, Effect
 from host.filter_error import filter_error_from
@@ -208,7 +208,7 @@ class Fitter:
         start = Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0]))
         held = np.zeros(values.size, dtype=bool)
         fit = output_error(start, self.inputs(explanation.names), held, FIRST_ITERATIONS, TOLERANCE)
-        return Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+        return scanned(self, Point(fit.structure, fit.parameters, fit.initial, fit.noise))
 
     def free(self, names: Names) -> Mask:
         """Which parameters of a set are estimated."""

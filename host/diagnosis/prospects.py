@@ -43,7 +43,7 @@ def form_gains(fitter: "Fitter", parent: Explanation) -> dict[str, float]:
     names = parent.names | {ANY_SMOOTH_FORCE.name}
     structure, inputs = structure_of(names), fitter.inputs(names, parent.fit.has_process_noise)
     point = fitter.point(names, parent, ANY_SMOOTH_FORCE.name, np.zeros(len(ANY_SMOOTH_FORCE.parameters)))
-    white, cost = _whitened(point, inputs, parent)
+    white, cost = whitened_at(point, inputs, parent)
     own = {parameter.name for parameter in ANY_SMOOTH_FORCE.parameters}
     free = fitter.free(names) & np.array([name not in own for name in structure.names])
     before, charge = parent.fit.deviance, log(parent.fit.samples)
@@ -75,7 +75,7 @@ def probed(
     for probe in [*values, *(_probes(fitter, effect, parent) if is_thorough else [])]:
         point = fitter.point(names, parent, effect.name, probe)
         own = np.array(point.structure.names)
-        white, cost = _whitened(point, inputs, parent)
+        white, cost = whitened_at(point, inputs, parent)
         if not np.isfinite(cost):
             found.append((-np.inf, probe))
             continue
@@ -88,7 +88,7 @@ def probed(
     return found
 
 
-def _whitened(
+def whitened_at(
     point: Point, inputs: list[Inputs], parent: Explanation
 ) -> tuple[list[tuple[Array, Array]], float]:
     """Innovations and sensitivities under the parent's noise, and the deviance: inf if lost."""
@@ -137,7 +137,7 @@ def _scanned(fitter: "Fitter", name: str, parent: Explanation, first: float, las
     own = np.array(point.structure.names)
     limits = np.where(own == FIRST, first, np.where(own == LAST, last, point.parameters))
     point = replace(point, parameters=limits)
-    white, cost = _whitened(point, fitter.inputs(names, parent.fit.has_process_noise), parent)
+    white, cost = whitened_at(point, fitter.inputs(names, parent.fit.has_process_noise), parent)
     times = first + (last - first) * np.arange(1, COUNT + 1) / (COUNT + 1)
     if not np.isfinite(cost):
         return [float(time) for time in times[COUNT // 6 :: COUNT // 6]]

@@ -11,12 +11,13 @@ import numpy as np
 
 from host.catalogue import named
 from host.catalogue.kin import measure_alike
+from host.catalogue.moments import FIRST, LAST
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import first_guess
 from host.diagnosis.margins import LARGEST_SET
 from host.diagnosis.prospects import probed
 from host.gauss_newton import Point
-from host.output_error import annealed
+from host.output_error import annealed, free_run_cost
 from host.recording import Array
 from host.valleys import A2, A3, B2, has_usual_heave, with_usual_heave
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
 
 FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
+SCANS_OF_A_MOMENT = (24, 96)  # times, the second between the neighbours of the best
 FEW = 1  # members of a set, the free trim among them, that lacks the most
 SLUGGISH, USUAL_PITCH_DAMPING = -0.3, -3.0  # 1/s, of a2: a base that lacks a slow plane is a slow hull
 
@@ -51,6 +53,31 @@ def idle(start: Point, name: str) -> Point:
     """A start at which the effect does not act yet, as near as its bounds allow."""
     values = np.where(np.isin(start.structure.names, named(name).size_names), 0.0, start.parameters)
     return replace(start, parameters=start.structure.clipped(values))
+
+
+def scanned(fitter: "Fitter", start: Point) -> Point:
+    """The start with each of its moments where a free run is nearest to the recordings, all else held.
+
+    A moment that lay between the stretches an explanation was fitted to may lie anywhere between them, and of
+    its likelihood, which has many maxima, none is seen from far.
+    """
+    names = frozenset(effect.name for effect in start.structure.effects)
+    own, free, inputs = start.structure.names, fitter.free(names), fitter.inputs(names)
+    for k in (k for k, name in enumerate(own) if name in start.structure.moments and free[k]):
+        first, last = fitter.held[FIRST], fitter.held[LAST]
+        for count in SCANS_OF_A_MOMENT:
+            apart = (last - first) / (count + 1)
+            times = [start.parameters[k], *(first + apart * np.arange(1, count + 1))]
+            tried = [_with_value(start, k, float(time)) for time in times]
+            start = min(tried, key=lambda point: free_run_cost(point, inputs))
+            first, last = start.parameters[k] - apart, start.parameters[k] + apart
+    return start
+
+
+def _with_value(point: Point, k: int, value: float) -> Point:
+    parameters = point.parameters.copy()
+    parameters[k] = value
+    return replace(point, parameters=point.structure.clipped(parameters))
 
 
 def is_far(fitter: "Fitter", parent: Explanation) -> bool:

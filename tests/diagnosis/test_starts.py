@@ -7,7 +7,7 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import named, structure_of
-from host.diagnosis.diagnose import deviations
+from host.diagnosis.deviations import deviations
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.prospects import probed
@@ -66,7 +66,40 @@ def test_a_moment_of_which_nothing_tells_is_uncertain_by_no_more_than_the_record
     name = "rudder_effectiveness_change"
     start = fitter.point(frozenset({name}), fitter.base, name, np.array([-0.1, 60.0]))
     found = fitter.explained(frozenset({name}), fitter.carried_on(start))
-    assert deviations(found, plain)["effectiveness_time"] == plain.duration / np.sqrt(12.0)
+    assert deviations(fitter, found)["effectiveness_time"] == plain.duration / np.sqrt(12.0)
+
+
+def test_a_moment_that_lay_between_the_stretches_fitted_first_is_found_on_all_of_them() -> None:
+    def lamed(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+        lost = -0.5 * plane * (time > WEAKENED_AT)
+        return lost * BASE["b1"], lost * BASE["b2"], 0.0
+
+    fitter, names = Fitter([hidden_dive(lamed)]), frozenset({"rudder_effectiveness_change"})
+    elsewhere = fitter.point(names, fitter.base, *names, np.array([-0.5, WEAKENED_AT + 9.0]))
+    index = elsewhere.structure.names.index("effectiveness_time")
+    assert fitter.carried_on(elsewhere).parameters[index] > WEAKENED_AT + 3.0
+    unsettled = fitter.explained(names, output_error(elsewhere, fitter.inputs(names), fitter.free(names), 1))
+    again = fitter.refitted(unsettled)
+    assert again.fit.parameters[index] == pytest.approx(WEAKENED_AT, abs=0.1)
+    assert 0.02 < deviations(fitter, again)["effectiveness_time"] < 0.1
+
+
+def test_a_moment_at_which_the_plane_rested_may_be_anywhere_in_that_rest() -> None:
+    rest, moment = (40.0, 50.0), 47.0
+
+    def lamed(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+        lost = -plane * (1.0 if rest[0] <= time < rest[1] else 0.5 * (time > moment))
+        return lost * BASE["b1"], lost * BASE["b2"], 0.0
+
+    dive = hidden_dive(lamed)
+    rests = (dive.time > rest[0] - 1e-6) & (dive.time < rest[1] - 1e-6)
+    fitter, name = Fitter([replace(dive, rudder=np.where(rests, 0.0, dive.rudder))]), "effectiveness_time"
+    found = fitter.grown(fitter.base, "rudder_effectiveness_change", [np.array([-0.5, 44.0])])
+    value = dict(zip(found.fit.structure.names, found.fit.parameters, strict=True))[name]
+    std = deviations(fitter, found)[name]
+    assert rest[0] - 0.2 < value < rest[1] + 0.2
+    assert abs(value - moment) < 2.0 * std
+    assert 2.4 < std < 5.3
 
 
 @pytest.mark.parametrize("name", ["pitch_sensor_lag", "actuator_lag"])
