@@ -83,7 +83,7 @@ class Fitter:
             self.held[FIRST] = max(self.held[FIRST], min(alarms) - ALARM_LATE)
             self.held[LAST] = min(self.held[LAST], max(alarms) + ALARM_EARLY)
         self._longest_substep = LONGEST_SUBSTEP
-        self._inputs: dict[tuple[Names, bool], list[Inputs]] = {}
+        self._inputs: dict[tuple[bool, bool], list[Inputs]] = {}  # by whether they hold earlier commands
         self.base = self._base() if known is None else known
         parameters = self.base.fit.parameters
         self._longest_substep = longest_substep(parameters)
@@ -231,14 +231,15 @@ class Fitter:
 
         A filter takes errors for normal: of rounded readings it gets no more than they tell.
         """
-        if (names, for_filter) not in self._inputs:
-            structure, steps = structure_of(names), NO_STEPS if for_filter else self.steps
+        structure, steps = structure_of(names), NO_STEPS if for_filter else self.steps
+        kind = structure.needs_lags, for_filter
+        if kind not in self._inputs:
             rows = zip(self.thinned if for_filter else self._told, self._speed_errors, strict=True)
-            self._inputs[names, for_filter] = [
+            self._inputs[kind] = [
                 inputs_of(recording, structure, self._longest_substep, steps, error)
                 for recording, error in rows
             ]
-        return self._inputs[names, for_filter]
+        return [replace(one, structure=structure) for one in self._inputs[kind]]
 
     def explained(self, names: Names, fit: Fit) -> Explanation:
         """The fit of a set, with what the set is charged."""
