@@ -1,17 +1,17 @@
 """Kalman filter over a recording: innovations when random forces act on the vehicle."""
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 
 from host.equations import Structure
-from host.propagate import Form, Inputs, form_of, over_rows, start_of
+from host.propagate import KEPT, Form, Inputs, form_of, over_rows, start_of
 from host.recording import Array
 
 
-@cache
+@lru_cache(KEPT)
 def _kalman(form: Form) -> ca.Function:
     """One step of the extended Kalman filter with white force and moment noise; gives e, S and K."""
     x, p, drive = form.symbols()

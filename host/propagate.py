@@ -7,7 +7,7 @@ resolution.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -23,6 +23,7 @@ MOST_SUBSTEPS = 8  # slow records show no modes faster than their sampling: fine
 LONGEST_SUBSTEP = 0.05  # s; for a 10 rad/s mode the error of one sub-step is below 3e-4 of its change
 LONGEST_DELAY = 1.0  # s; how far back commands are looked up
 ROWS_AT_ONCE = 256
+KEPT = 64  # functions of each kind: a search meets hundreds of sets, and those of all would fill the memory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,7 +160,7 @@ def _behind(y: ca.SX, start: ca.SX, end: ca.SX, bend: ca.SX, lag: ca.SX, h: ca.S
     return settled_now + (y - settled_then) * ca.exp(-h / lag)
 
 
-@cache
+@lru_cache(KEPT)
 def _slope(form: Form) -> ca.Function:
     """x' for a plane angle that is held; as a function of its own, as inlining it is quicker than tracing."""
     x, p, drive = form.symbols()
@@ -169,7 +170,7 @@ def _slope(form: Form) -> ca.Function:
     return ca.Function("slope", [x, time, plane, p, drive], [form.structure.derivative(chain)])
 
 
-@cache
+@lru_cache(KEPT)
 def _followed(form: Form, of: Callable[[Chain], ca.SX]) -> ca.Function:
     """What a sensor follows with a lag, and its rate where the state moves so."""
     x, p, drive = form.symbols()
@@ -177,7 +178,7 @@ def _followed(form: Form, of: Callable[[Chain], ca.SX]) -> ca.Function:
     return ca.Function("followed", [x, rates, p, drive], [value, ca.jtimes(value, x, rates)])
 
 
-@cache
+@lru_cache(KEPT)
 def _initial(form: Form) -> ca.Function:
     """All states at the first row, and their derivatives by the parameters and the four base states."""
     x0, (_, p, drive) = ca.SX.sym("x0", NX0), form.symbols()
@@ -186,7 +187,7 @@ def _initial(form: Form) -> ca.Function:
     return ca.Function("initial", [x0, p, drive], [x, slopes])
 
 
-@cache
+@lru_cache(KEPT)
 def _free_run(form: Form) -> ca.Function:
     x, p, drive = form.symbols()
     *within, after = form.step(x, p, drive)
@@ -225,7 +226,7 @@ def over_rows(step: Callable[[Form], ca.Function], form: Form, rows: int) -> Ove
     return run
 
 
-@cache
+@lru_cache(KEPT)
 def _accumulated(step: Callable[[Form], ca.Function], form: Form, rows: int) -> ca.Function:
     """Over few rows: CasADi takes longer to build such a function over many than to run it.
 

@@ -8,13 +8,13 @@ at fixed gain K; without one it is the free run. The slopes F_x, F_p, h_x, h_p a
 Runge-Kutta steps of the run; where the run has been, they are evaluated at all rows at once.
 """
 
-from functools import cache
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 
 from host.all_rows import AllRows
-from host.propagate import Form, Inputs, Run, form_of, free_run, over_rows, start_of
+from host.propagate import KEPT, Form, Inputs, Run, form_of, free_run, over_rows, start_of
 from host.recording import Array
 
 
@@ -83,7 +83,7 @@ def _recursion(Fx: Array, Fp: Array, start: Array) -> Array:
     return S
 
 
-@cache
+@lru_cache(KEPT)
 def _steered_run(form: Form) -> ca.Function:
     """One step of the innovations form; gives x, h(x) and where the sub-steps begin."""
     x, p, drive = form.symbols()
@@ -95,7 +95,7 @@ def _steered_run(form: Form) -> ca.Function:
     return ca.Function("steered_run", [x, per_step, p], [after, result])
 
 
-@cache
+@lru_cache(KEPT)
 def _substep_slopes(form: Form) -> AllRows:
     """F_x (nx, nx) and F_p (nx, parameters) of one sub-step."""
     (x, p, drive), number = form.symbols(), ca.SX.sym("number")
@@ -104,7 +104,7 @@ def _substep_slopes(form: Form) -> AllRows:
     return AllRows(ca.Function("substep", [x, p, drive, number], slopes))
 
 
-@cache
+@lru_cache(KEPT)
 def _output_slopes(form: Form) -> AllRows:
     """h_x (2, nx) and h_p (2, parameters)."""
     x, p, drive = form.symbols()

@@ -19,7 +19,7 @@ from host.diagnosis.pruning import leanest
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.sea_fits import WAVES, again_in_waves, with_regular_waves, with_sea
 from host.diagnosis.search import Search
-from host.diagnosis.seas import Explained, among_waves, in_a_sea, in_plain_waves
+from host.diagnosis.seas import Explained, among_waves, explains_more, in_a_sea, in_plain_waves
 from host.diagnosis.spans import Spans, divide, excerpt
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.unknown_physics import known_in, unknown_in, with_unknown
@@ -189,10 +189,12 @@ def _explain(
         left = leftover(fitter, best)
     may_be_sea = part is None or part.best.fit.has_process_noise
     if may_be_sea and (unknown_in(best) or not left.is_nothing):
-        calm = best
-        if waves is not None and (explained := in_plain_waves(search, best, waves)) is not None:
-            return explained
+        calm, plain = best, None if waves is None else in_plain_waves(search, best, waves)
+        if plain is not None and plain.left.is_nothing:
+            return plain
         search, best = in_a_sea(search, best)
+        if plain is not None and explains_more(plain, best):
+            return plain
         if part is None or part.waves is not None:
             search, best, told = among_waves(search, best, calm)
         left = leftover(fitter, best if told is None else told.fitted)

@@ -80,14 +80,19 @@ def plain_waves(fitter: Fitter) -> Explanation | None:
 def in_plain_waves(calm: Search, best: Explanation, waves: Explanation) -> Explained | None:
     """The search among waves that were plain to see, where they explain more than the best without them.
 
-    And where nothing is left then: else what is hidden may only pass for waves.
+    Where something is left then, what is hidden may only pass for waves.
     """
     least = as_filtered(calm.fitter, best).bic
     if waves.bic > least - NAMING_MARGIN:
         return None
     search, found, told = _searched(calm, waves, least)
-    left = leftover(calm.fitter, told.fitted)
-    return Explained(found, search, left, told) if left.is_nothing else None
+    return Explained(found, search, leftover(calm.fitter, told.fitted), told)
+
+
+def explains_more(plain: Explained, best: Explanation) -> bool:
+    """Whether what was found among plain waves is clearly likelier than the best without them."""
+    fitted = best if plain.waves is None else plain.waves.fitted
+    return fitted.bic < as_filtered(plain.search.fitter, best).bic - NAMING_MARGIN
 
 
 def among_waves(

@@ -11,7 +11,7 @@ from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
 from host.diagnosis.sea_fits import with_sea
 from host.diagnosis.search import Search
-from host.diagnosis.seas import among_waves, in_plain_waves, plain_waves
+from host.diagnosis.seas import among_waves, explains_more, in_plain_waves, plain_waves
 from host.diagnosis.workers import Workers
 from host.recording import Array
 
@@ -80,8 +80,14 @@ def test_what_only_passes_for_waves_is_none(monkeypatch: pytest.MonkeyPatch) -> 
         better = replace(fitter.root, bic=waves.bic)
         assert in_plain_waves(calm, better, waves) is None  # what acts without waves explains as much
         monkeypatch.setattr(Search, "run", lambda _, also: also[0])
-        assert in_plain_waves(calm, fitter.root, waves) is not None
+        plain = in_plain_waves(calm, fitter.root, waves)
+        assert plain is not None
+        assert plain.left.is_nothing
+        assert explains_more(plain, fitter.root)
+        assert not explains_more(plain, better)
         coloured = replace(leftover(fitter, waves), is_coloured=True)
         monkeypatch.setattr("host.diagnosis.seas.leftover", lambda *_: coloured)
-        assert in_plain_waves(calm, fitter.root, waves) is None  # something else is left among them
+        doubtful = in_plain_waves(calm, fitter.root, waves)
+        assert doubtful is not None
+        assert not doubtful.left.is_nothing  # something else is left among them
     assert plain_waves(Fitter([hidden_dive(duration=60.0)])) is None
