@@ -7,6 +7,7 @@ effects put to zero and their other parameters idle, the rest o follows by -M_oo
 
 import numpy as np
 
+from host.diagnosis.margins import ROUGH
 from host.equations import Effect
 from host.fit import Fit
 from host.recording import Array
@@ -34,3 +35,12 @@ def one_step_without(fit: Fit, *effects: Effect) -> tuple[float, Array] | None:
     parameters[gone] = 0.0
     parameters[others] += follow
     return float(loss), fit.structure.clipped(parameters)
+
+
+def promises_more(larger: Fit, effect: Effect, known: Fit) -> bool:
+    """Whether a larger set without the effect should be clearly likelier than what is known of that set.
+
+    What is known may have ended in another valley, bent towards what it lacked as it grew.
+    """
+    ahead = one_step_without(larger, effect)
+    return ahead is not None and larger.log_likelihood - 0.5 * ahead[0] > known.log_likelihood + ROUGH

@@ -14,7 +14,7 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
 from host.diagnosis.locate import Location, locate
-from host.diagnosis.plane_choice import Way, is_likelier, ways
+from host.diagnosis.plane_choice import Way, by_single_effects, is_likelier, ways
 from host.diagnosis.pruning import leanest
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.sea_fits import WAVES, again_in_waves, with_regular_waves, with_sea
@@ -92,24 +92,24 @@ def diagnose(
     Spikes are left out first, and it is asked what the plane did between rows: that is no physics.
     """
     on_progress("base model")
-    first, *others = ways(without_outliers(recordings))
+    first, *others = by_single_effects(ways(without_outliers(recordings)), on_progress, jobs)
     return _diagnosed(first, others, on_progress, jobs)
 
 
 def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], jobs: int) -> Diagnosis:
     """The diagnosis with the plane taken so, unless what is found speaks for another way."""
-    recordings, fitter, plain = way
+    recordings, fitter = way.recordings, way.fitter
     floor = noise_floor(recordings)
     spans = divide(recordings)
     part = None
     if excerpt(spans.teaching) is not spans.teaching:
         on_progress("an excerpt")
         with Workers(fitter, jobs) as workers:
-            part = _explain(fitter, workers, on_progress, waves=plain)
+            part = _explain(fitter, workers, on_progress, way)
         on_progress("the whole")
         fitter = Fitter(spans.teaching)
     with Workers(fitter, jobs) as workers:
-        explained = _explain(fitter, workers, on_progress, part, plain if part is None else None)
+        explained = _explain(fitter, workers, on_progress, way, part)
         again = next(
             (other for other in others if is_likelier(other, explained.search, explained.best)), None
         )
@@ -173,16 +173,14 @@ def _explain(
     fitter: Fitter,
     workers: Workers,
     on_progress: Callable[[str], None],
+    way: Way,
     part: Explained | None = None,
-    waves: Explanation | None = None,
 ) -> Explained:
-    """Searches for the best explanation, or goes on from that of a part, where most has been settled.
-
-    waves  the root among waves, where these are plain to see
-    """
+    """Searches for the best explanation, or goes on from that of a part, where most has been settled."""
     known = None if part is None else part.search
-    search = Search(fitter, workers, on_progress, fitter.base, fitter.root, known)
+    search = Search(fitter, workers, on_progress, fitter.base, fitter.root, known, way.alone)
     best = search.run([] if part is None else [fitter.refitted(part.best)])
+    waves = way.waves if part is None else None
     left, told = leftover(fitter, best), None
     if best.names or not left.is_nothing:
         best = with_unknown(search, best)

@@ -1,5 +1,6 @@
 """Whether a plane held its angles between rows or moved on (host.plane_between_rows): asked of the motion."""
 
+from collections.abc import Callable
 from math import inf
 from typing import NamedTuple
 
@@ -12,21 +13,25 @@ from host.diagnosis.margins import NAMING_MARGIN
 from host.diagnosis.search import Search
 from host.diagnosis.seas import plain_waves
 from host.diagnosis.spans import divide, excerpt
+from host.diagnosis.workers import Workers
 from host.plane_between_rows import with_moving_plane
 from host.recording import Recording
 
 CONTENDERS = 10  # sets that are tried with the plane the other way
+LEADING = 3  # single effects, of which the likeliest often is a part of the truth
 
 
 class Way(NamedTuple):
     """The recordings with the plane taken one way, and the base fitted to what a search begins with.
 
-    waves  the base among waves, where these are plain to see
+    waves  the root among waves, where these are plain to see
+    alone  each effect alone, where these were fitted
     """
 
     recordings: list[Recording]
     fitter: Fitter
     waves: Explanation | None = None
+    alone: tuple[Explanation, ...] = ()
 
 
 def ways(recordings: list[Recording]) -> list[Way]:
@@ -44,6 +49,27 @@ def ways(recordings: list[Recording]) -> list[Way]:
         return fitted
     seen = [leading._replace(waves=waves), *(way._replace(waves=plain_waves(way.fitter)) for way in rest)]
     return sorted(seen, key=lambda way: inf if way.waves is None else way.waves.bic)
+
+
+def by_single_effects(found: list[Way], on_progress: Callable[[str], None], jobs: int) -> list[Way]:
+    """The ways in order, the likelier first, as the effects see them that explain most alone.
+
+    The base equations bend towards what they lack, and may follow the wrong way better by chance.
+    """
+    leading, *rest = found
+    if not rest or leading.waves is not None:
+        return found
+    with Workers(leading.fitter, jobs) as workers:
+        search = Search(leading.fitter, workers, on_progress, leading.fitter.base, leading.fitter.root)
+        leading = leading._replace(alone=tuple(search.singles()))
+    best = sorted(leading.alone, key=lambda e: e.bic)[:LEADING]
+    least = min(leading.fitter.root.bic, best[0].bic) - NAMING_MARGIN
+    likelier = [
+        way
+        for way in rest
+        if way.fitter.root.bic < least or any(way.fitter.reduced(e, e.names).bic < least for e in best)
+    ]
+    return [*likelier, leading, *(way for way in rest if way not in likelier)]
 
 
 def is_likelier(other: Way, search: Search, best: Explanation) -> bool:

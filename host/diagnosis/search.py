@@ -10,16 +10,17 @@ Where one effect leaves much, or many were needed, what every vehicle has is fit
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from itertools import combinations
 from math import inf
 
 from host.catalogue import named
 from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE, has_memory
+from host.diagnosis.absence import promises_more
 from host.diagnosis.exchange import exchanged
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import FEW, LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN, ROUGH, SMALL, margin
+from host.diagnosis.offset_choice import retrimmed, with_offset
 from host.diagnosis.pruning import pruned
 from host.diagnosis.together import completed, together
 from host.diagnosis.workers import Task, Workers
@@ -43,6 +44,7 @@ class Search:
     base  the paper's equations alone, `root` the same with a free trim; all that is tried grows from it, with
           random forces where the root has them
     part  the search over an excerpt of the recordings that this one goes on from
+    alone  each effect alone, where these were fitted before
     rivals  sets that were fitted in an exchange
     joint   sets with all that every vehicle has
     """
@@ -53,10 +55,11 @@ class Search:
     base: Explanation
     root: Explanation
     part: "Search | None" = None
+    alone: tuple[Explanation, ...] = ()
     tried: dict[Names, Explanation] = field(default_factory=dict)
     rivals: set[Names] = field(default_factory=set)
     joint: set[Names] = field(default_factory=set)
-    _shrunk: set[Names] = field(default_factory=set)  # those fitted from a larger set
+    _shrunk: dict[Names, set[Names]] = field(default_factory=dict)  # those fitted from larger sets: which
     _polished: set[Names] = field(default_factory=set)  # those of them fitted to the end
 
     def run(self, also: list[Explanation] | None = None) -> Explanation:
@@ -75,16 +78,18 @@ class Search:
             best_before = min(e.bic for e in beam)
             beam = self._parents(grown)[: BEAM if size == 1 else NARROW]
             if size == 1 and beam and self.fitter.excess(beam[0].fit) > LITTLE:
-                beam = self._with_offset(beam)
+                beam = [*with_offset(self, beam[:NARROW]), *beam[NARROW:]][:BEAM]
             if beam and self._leaves_nothing(beam[0]):
                 del beam[1:]  # whatever grows from the others is not likelier
             if not beam or beam[0].bic > best_before - margin(beam[0]):
                 break
         self.on_progress("settling")
-        return completed(self, self._settled(self._retrimmed()))
+        return completed(self, self._settled(retrimmed(self)))
 
     def singles(self) -> list[Explanation]:
         """Each effect alone on top of the root."""
+        if self.alone:
+            return [self.remember(explanation) for explanation in self.alone]
         return self._grown([self.remember(self.root)], 1)
 
     def without(self, best: Explanation, name: str) -> Explanation:
@@ -94,7 +99,9 @@ class Search:
     def each_without(self, best: Explanation, members: list[str]) -> list[Explanation]:
         """The set less each of these members; of a large one, what is far from it is fitted roughly."""
         sets = [best.names - {name} for name in members]
-        self.shrink(best, [names for names in sets if names not in self.tried])
+        self.shrink(
+            best, [names for names in sets if names not in self.tried or self._falls_behind(names, best)]
+        )
         limit = best.bic + (ROUGH if len(best.names) > LARGEST_SET else inf)
         self.polish([names for names in sets if names in self._shrunk and self.tried[names].bic < limit])
         return [self.tried[names] for names in sets]
@@ -134,12 +141,23 @@ class Search:
         return "grown", (parent, name, self.values(name))
 
     def shrink(self, explanation: Explanation, smaller: Iterable[Names]) -> None:
-        """Fits sets of one member less roughly, once."""
-        new = [names for names in smaller if names not in self._shrunk]
+        """Fits sets of one member less roughly, once; again from a set without which they fell behind."""
+        new = [
+            names for names in smaller if names not in self._shrunk or self._falls_behind(names, explanation)
+        ]
         members = [next(iter(explanation.names - names)) for names in new]
         for found in self.workers.results([("shrunk", (explanation, member)) for member in members]):
             self.remember(found)
-        self._shrunk.update(new)
+        for names in new:
+            self._shrunk.setdefault(names, set()).add(explanation.names)
+            self._polished.discard(names)
+
+    def _falls_behind(self, names: Names, larger: Explanation) -> bool:
+        """Whether a set that is known should do better from a larger one, from which it was not fitted."""
+        if larger.names in self._shrunk.get(names, ()):
+            return False
+        (member,) = larger.names - names
+        return promises_more(larger.fit, named(member), self.tried[names].fit)
 
     def polish(self, sets: Iterable[Names]) -> None:
         """Fits sets to the end, once."""
@@ -237,50 +255,9 @@ class Search:
         """Whether much is left although all that every vehicle has was tried at once."""
         return bool(self.joint) and self.fitter.excess(best.fit) > MUCH
 
-    def _retrimmed(self) -> Explanation:
-        """The leading sets with the free trim explained by as few of the offsets as will do."""
-        free = [e for e in self.tried.values() if FREE_TRIM.name in e.names]
-        free = sorted((e for e in free if not self._has_idle_member(e)), key=lambda e: e.bic)
-        polished = self.polished_near(free[: 2 * BEAM], free[0].bic)
-        leading = min(polished, key=lambda e: e.bic)
-        # Those that come close may sit in poorer valleys than it does.
-        close = sorted((e for e in polished if e.bic < leading.bic + ROUGH), key=lambda e: e.bic)
-        if len(close) > 1 and self.fitter.excess(leading.fit) < LITTLE:
-            polished = self.across(close[:CONTENDERS]) + close[CONTENDERS:]
-            leading = min(polished, key=lambda e: e.bic)
-        polished = [e for e in polished if e.bic < leading.bic + 2.0 * NAMING_MARGIN]
-        if len(leading.names) > LARGEST_SET:
-            polished = [leading]
-        explained = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
-        for counts in ((0, 1), (2,)):
-            ways = [frozenset(way) for count in counts for way in combinations(OFFSETS, count)]
-            tasks = [("retrimmed", (e, way)) for e in polished for way in ways]
-            retrimmed = [self.remember(e) for e in self.workers.results(tasks)]
-            explained += self.polished_near(retrimmed, min(e.bic for e in [*explained, *retrimmed]))
-            best = min(explained, key=lambda e: e.bic)
-            if best.bic < leading.bic + margin(leading):
-                break
-        return best
-
     def _leaves_nothing(self, leading: Explanation) -> bool:
         white = all(is_white(e) and is_even(e) for e in leading.fit.whitened)
         return white and self.fitter.excess(leading.fit) < LITTLE
-
-    def _with_offset(self, beam: list[Explanation]) -> list[Explanation]:
-        """The beam, before it a set with an offset that explains more than the free trim in its place.
-
-        At a speed that changes no constant force does what a bias of the pitch sensor or a current does.
-        """
-        tasks = [("retrimmed", (e, frozenset({name}))) for e in beam[:NARROW] for name in OFFSETS]
-        best = min((self.remember(e) for e in self.workers.results(tasks)), key=lambda e: e.bic)
-        return [best, *beam[: BEAM - 1]] if best.bic < beam[0].bic - margin(beam[0]) else beam
-
-    def _has_idle_member(self, explanation: Explanation) -> bool:
-        """Whether a smaller set does better; if as well only, the free trim may do a part of the work."""
-        return any(
-            self.root.names <= names < explanation.names and smaller.bic < explanation.bic
-            for names, smaller in self.tried.items()
-        )
 
     def _candidates(self, parent: Explanation) -> list[str]:
         """What may join a set: the offsets only once the free trim, which does their work, has gone.

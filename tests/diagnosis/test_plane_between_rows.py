@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.files import write_extended_model
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.plane_choice import is_likelier, ways
+from host.diagnosis.plane_choice import by_single_effects, is_likelier, ways
 from host.diagnosis.search import Search
 from host.diagnosis.workers import Workers
 from host.equations import NAMES
@@ -139,8 +139,18 @@ def test_a_model_file_says_what_the_plane_does_or_the_plane_is_held(tmp_path: Pa
         read_model(tmp_path / "m.json")
 
 
+def test_what_explains_most_alone_may_speak_against_the_base() -> None:
+    found = ways([dive("moving")])
+    kept, *_ = by_single_effects(found, lambda _: None, 1)
+    turned, again = by_single_effects(found[::-1], lambda _: None, 1)
+    assert kept.recordings is turned.recordings is found[0].recordings
+    assert [bool(one.alone) for one in (kept, turned, again)] == [True, False, True]
+    assert by_single_effects([found[0]], lambda _: None, 1) == [found[0]]  # no other way: not asked
+
+
 def test_what_is_found_may_speak_against_the_first_choice(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("host.diagnosis.diagnose.ways", lambda recordings: ways(recordings)[::-1])
+    monkeypatch.setattr("host.diagnosis.diagnose.by_single_effects", lambda found, *_: found)
     found = diagnose([dive("moving")])
     assert found.verdict == "no_mismatch"
     assert NOTE in found.recordings[0].notes

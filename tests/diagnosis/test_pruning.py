@@ -1,5 +1,6 @@
 """Of a large set, what is idle goes at once; what pays stays."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -75,3 +76,14 @@ def test_what_improves_it_by_going_alone_goes_at_once_unless_two_do_the_same_wor
         monkeypatch.setattr(Search, "shrink", lambda *given: fitted.append(len(given[2])) or shrink(*given))
         assert pruned(search, joint).names == TRUE
     assert (sum(fitted) > 30) == are_needed_together
+
+
+def test_a_set_that_ended_in_a_poor_valley_is_fitted_again_from_a_larger_one(fitter: Fitter) -> None:
+    with Workers(fitter, 1) as workers:
+        search = search_of(fitter, workers)
+        good = fitter.grown(fitter.grown(fitter.base, "heave_pitch_rate_coupling", []), "munk_moment", [])
+        alone = fitter.grown(fitter.base, "heave_pitch_rate_coupling", [])
+        poor = replace(alone.fit, log_likelihood=alone.fit.log_likelihood - 500.0)
+        search.remember(replace(alone, fit=poor, bic=alone.bic + 1000.0))
+        (found,) = search.each_without(good, ["munk_moment"])
+    assert found.bic == pytest.approx(alone.bic, abs=0.1)

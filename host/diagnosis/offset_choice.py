@@ -1,0 +1,59 @@
+"""Which offsets the free trim stands for: buoyancy, a trim moment, a zero error, a bias, a current."""
+
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+from host.catalogue.kin import OFFSETS
+from host.catalogue.nuisance import FREE_TRIM
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, ROUGH, margin
+
+if TYPE_CHECKING:
+    from host.diagnosis.search import Search
+
+LEADING = 8  # sets with a free trim that are looked at
+CONTENDERS = 3  # of them, for the first place
+
+
+def retrimmed(search: "Search") -> Explanation:
+    """The leading sets with the free trim explained by as few of the offsets as will do."""
+    free = [e for e in search.tried.values() if FREE_TRIM.name in e.names]
+    free = sorted((e for e in free if not _has_idle_member(search, e)), key=lambda e: e.bic)
+    polished = search.polished_near(free[:LEADING], free[0].bic)
+    leading = min(polished, key=lambda e: e.bic)
+    # Those that come close may sit in poorer valleys than it does.
+    close = sorted((e for e in polished if e.bic < leading.bic + ROUGH), key=lambda e: e.bic)
+    if len(close) > 1 and search.fitter.excess(leading.fit) < LITTLE:
+        polished = search.across(close[:CONTENDERS]) + close[CONTENDERS:]
+        leading = min(polished, key=lambda e: e.bic)
+    polished = [e for e in polished if e.bic < leading.bic + 2.0 * NAMING_MARGIN]
+    if len(leading.names) > LARGEST_SET:
+        polished = [leading]
+    explained = [e for e in search.tried.values() if FREE_TRIM.name not in e.names]
+    for counts in ((0, 1), (2,)):
+        ways = [frozenset(way) for count in counts for way in combinations(OFFSETS, count)]
+        tasks = [("retrimmed", (e, way)) for e in polished for way in ways]
+        found = [search.remember(e) for e in search.workers.results(tasks)]
+        explained += search.polished_near(found, min(e.bic for e in [*explained, *found]))
+        best = min(explained, key=lambda e: e.bic)
+        if best.bic < leading.bic + margin(leading):
+            break
+    return best
+
+
+def with_offset(search: "Search", beam: list[Explanation]) -> list[Explanation]:
+    """The beam, before it the best of its sets with an offset, if that explains more than the free trim.
+
+    At a speed that changes no constant force does what a bias of the pitch sensor or a current does.
+    """
+    tasks = [("retrimmed", (e, frozenset({name}))) for e in beam for name in OFFSETS]
+    best = min((search.remember(e) for e in search.workers.results(tasks)), key=lambda e: e.bic)
+    return [best, *beam] if best.bic < beam[0].bic - margin(beam[0]) else beam
+
+
+def _has_idle_member(search: "Search", explanation: Explanation) -> bool:
+    """Whether a smaller set does better; if as well only, the free trim may do a part of the work."""
+    return any(
+        search.root.names <= names < explanation.names and smaller.bic < explanation.bic
+        for names, smaller in search.tried.items()
+    )
