@@ -1,7 +1,8 @@
 """The verdict on an explanation, and the sentence that says what remains.
 
 As catalogues can imitate, an explanation that leaves nothing is not yet a good one: several effects at once,
-none of which every vehicle has, are less likely than one that the catalogue lacks.
+none of which every vehicle has, are less likely than one that the catalogue lacks; and so are large offsets
+that cancel, of which only the curve of one (a weight along a pitched hull, c_w0 (cos theta - 1)) remains.
 """
 
 from typing import Literal
@@ -16,6 +17,7 @@ from host.diagnosis.unknown_physics import known_in, unknown_in
 Verdict = Literal["no_mismatch", "explained", "partly_explained", "unexplained"]
 WORSE = 2.0  # chi2 of held-out spans from which on an explanation must at least better the base there
 MOST_RARE = 2  # effects at once that not every vehicle has
+CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
 
 
 def verdict_on(best: Explanation, left: Leftover, before: Misfit, after: Misfit) -> Verdict:
@@ -25,7 +27,7 @@ def verdict_on(best: Explanation, left: Leftover, before: Misfit, after: Misfit)
     # Random forces spoil a free run whatever is known: it need not be better for knowing more.
     worst = max(before.chi2 * (SEA_DOUBT if best.fit.has_process_noise else 1.0), WORSE)
     if left.is_nothing and after.chi2 < worst and not unknown_in(best):
-        return "explained" if len(rare_in(best)) <= MOST_RARE else "partly_explained"
+        return "partly_explained" if _doubt(best) else "explained"
     return "partly_explained" if known_in(best) and after.chi2 < 0.7 * before.chi2 else "unexplained"
 
 
@@ -33,6 +35,29 @@ def rare_in(explanation: Explanation) -> list[str]:
     """The effects of a set that not every vehicle has, and that are no offset."""
     usual = {*ORDINARY, *OFFSETS}
     return [name for name in known_in(explanation) if name not in usual and not BY_NAME[name].is_common]
+
+
+def cancelling_in(explanation: Explanation) -> list[str]:
+    """A zero error of the plane, a weight and a moment, where the first all but undoes the others."""
+    offsets = ["net_buoyancy", "rudder_offset", "trim_moment"]
+    if not explanation.names.issuperset(offsets):
+        return []
+    fit = explanation.fit
+    p = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
+    pairs = ((p["c_w0"], p["b1"] * p["rudder_zero"]), (p["c_q0"], p["b2"] * p["rudder_zero"]))
+    is_cancelled = all(abs(one + other) < (1.0 - CANCELLED) * abs(one) for one, other in pairs)
+    return offsets if is_cancelled else []
+
+
+def _doubt(explanation: Explanation) -> str:
+    """Why a set that leaves nothing may yet be none that acts; empty where nothing speaks against it."""
+    names, are = rare_in(explanation), "seldom act at once"
+    if len(names) <= MOST_RARE:
+        names, are = cancelling_in(explanation), "cancel"
+    if not names:
+        return ""
+    listed = ", ".join(name.replace("_", " ") for name in names)
+    return f"{listed} {are}: together they may imitate physics that the catalogue does not hold."
 
 
 def remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit) -> str:
@@ -57,12 +82,8 @@ def remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit
         return "What is left is as small as the sensors' own noise."
     if forms and left.is_nothing:
         return f"Physics is at work that the catalogue does not hold.{forms}" + sea
-    if left.is_nothing and after.chi2 < WORSE and len(rare_in(best)) > MOST_RARE:
-        listed = ", ".join(name.replace("_", " ") for name in rare_in(best))
-        return (
-            f"Nothing else is left, but {listed} seldom act at once: together they may imitate physics "
-            "that the catalogue does not hold." + sea
-        )
+    if left.is_nothing and after.chi2 < WORSE and (doubt := _doubt(best)):
+        return f"Nothing else is left, but {doubt}" + sea
     if left.is_smooth:
         kind = "it depends on the motion, so it is physics and no sea, but none that is known here"
     elif left.is_nothing:

@@ -1,13 +1,17 @@
 """The verdict on an explanation that leaves nothing, little or much, and what is said of the rest."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from hidden_dive import hidden_dive
 
+from host.catalogue import structure_of
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import Leftover
 from host.diagnosis.scoring import Misfit
-from host.diagnosis.verdict import Verdict, rare_in, remaining, verdict_on
+from host.diagnosis.verdict import Verdict, cancelling_in, rare_in, remaining, verdict_on
 
 COMMON = {"heave_pitch_rate_coupling", "munk_moment", "speed_loss", "actuator_lag", "net_buoyancy"}
 RARE = ("ballast_change", "depth_sensor_lever_arm", "internal_wave")
@@ -67,3 +71,20 @@ def test_what_explains_all_but_the_stretches_that_were_held_out_says_so(base: Ex
     one = named(base, RARE[0])
     assert remaining("explained", one, leftover(), misfit(1.2)).endswith("sensors' own noise.")
     assert "held out pitch is off by 3.0 times it" in remaining("explained", one, leftover(), misfit(9.0))
+
+
+@pytest.mark.parametrize(("left_over", "verdict"), [(0.01, "partly_explained"), (0.2, "explained")])
+def test_offsets_that_cancel_are_doubted_by_name(
+    base: Explanation, left_over: float, verdict: Verdict
+) -> None:
+    offsets = frozenset({"net_buoyancy", "rudder_offset", "trim_moment"})
+    structure = structure_of(offsets)
+    known = dict(zip(base.fit.structure.names, base.fit.parameters.tolist(), strict=True))
+    known |= {"rudder_zero": 0.2, "c_w0": -0.2 * known["b1"], "c_q0": -0.2 * known["b2"] * (1.0 + left_over)}
+    values = np.array([known[name] for name in structure.names])
+    best = Explanation(offsets, replace(base.fit, structure=structure, parameters=values), base.bic)
+    assert bool(cancelling_in(best)) == (verdict == "partly_explained")
+    assert verdict_on(best, leftover(), misfit(5.0), misfit(1.0)) == verdict
+    said = remaining(verdict, best, leftover(), misfit(1.0))
+    assert ("net buoyancy, rudder offset, trim moment cancel:" in said) == (verdict == "partly_explained")
+    assert not cancelling_in(replace(best, names=offsets - {"trim_moment"}))
