@@ -22,7 +22,7 @@ from host.output_error import SMALLEST_NOISE, output_error
 from host.propagate import Inputs, inputs_of
 from host.recording import Array, Recording
 from host.rounding import thinned
-from host.speed_error import speed_error
+from host.speed_error import speed_errors
 from host.start_values import start_values
 from host.valleys import are_apart, other_valleys, plausibility, with_rivals
 from host.waves import in_waves, in_waves_from, is_sea
@@ -57,10 +57,9 @@ def fit_maximum_likelihood(
     if recordings[0].has_speed:
         held["u0"] = float(np.mean([r.speed.mean() for r in recordings]))
     free = np.array([name not in held for name in structure.names])
-    steps = resolution(recordings)
-    told = thinned(recordings, steps)
     floor = noise_floor(recordings)
-    errors = [speed_error(recording, floor[1]) for recording in recordings]
+    errors, steps = speed_errors(recordings, floor[1], resolution(recordings))
+    told = thinned(recordings, steps)
     inputs = [
         inputs_of(recording, structure, steps=steps, speed_error=error)
         for recording, error in zip(told, errors, strict=True)

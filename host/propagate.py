@@ -55,10 +55,7 @@ def inputs_of(
     steps: Array | None = None,
     speed_error: SpeedError | None = None,
 ) -> Inputs:
-    """Inputs of one recording. Longer sub-steps (s) suit vehicles whose modes are known to be slow.
-
-    Where rounding rules depth (steps), what errors of speed do to it is lost in the rounding.
-    """
+    """Inputs of one recording. Longer sub-steps (s) suit vehicles whose modes are known to be slow."""
     intervals = recording.intervals
     steps = np.zeros(2) if steps is None else steps
     known = np.full(intervals.size, float(recording.has_speed))
@@ -80,7 +77,7 @@ def inputs_of(
         present=present.astype(float),
         substeps=int(np.ceil(recording.step / max(longest_substep, recording.step / MOST_SUBSTEPS) - 1e-6)),
         steps=steps,
-        speed_error=None if steps[1] else speed_error,
+        speed_error=speed_error,
     )
 
 

@@ -14,9 +14,10 @@ import numpy as np
 from scipy.linalg import solve_banded
 
 from host.recording import Array, Recording
+from host.rounding import thinned
 from host.speed import smoothed_speed
 
-SLIGHT = 0.01  # of the depth sensor's variance: less makes no difference
+SLIGHT = 0.001  # of the depth sensor's variance: less makes no difference, over thousands of rows either
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +80,21 @@ def speed_error(recording: Recording, depth_variance: float) -> SpeedError | Non
     if spread.max() < 1.0 + SLIGHT:
         return None
     return SpeedError(gain, leverage, decay, spread)
+
+
+def speed_errors(
+    recordings: list[Recording], depth_variance: float, steps: Array
+) -> tuple[list[SpeedError | None], Array]:
+    """Of each recording, and the steps (2,) of pitch and depth by whose rounding they can still be told.
+
+    The likelihood of intervals takes each reading's error for its own: where the speed's errors move depth, a
+    hundredth of a step, together is more than it allows, and depth is told as if its rounding were noise.
+    """
+    told = steps * [1.0, 0.0]
+    errors = [speed_error(one, depth_variance) for one in thinned(recordings, told)]
+    if steps[1] > 0.0 and not any(errors):
+        return [None] * len(recordings), steps
+    return errors, told
 
 
 def _gains(present: Array, leverage: Array, a: float, variance: float) -> tuple[Array, Array]:

@@ -71,13 +71,14 @@ def _backlash(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:  # 
 
 
 def _stall(c: Chain) -> None:
-    beyond = ca.fmax(0, ca.fabs(c.plane) - c.p["stall_angle"])
-    c.plane = c.plane - c.p["stall_loss"] * beyond * ca.sign(c.plane)
-    c.change = ca.if_else(beyond > 0, c.change * (1 - c.p["stall_loss"]), c.change)
+    size, angle, loss = ca.fabs(c.plane), c.p["stall_angle"], c.p["stall_loss"]
+    falling, least = size - loss * (size - angle), c.p["stall_share"] * angle
+    c.change = c.change * ca.if_else(size < angle, 1, (1 - loss) * (falling > least))
+    c.plane = ca.sign(c.plane) * ca.if_else(size < angle, size, ca.fmax(falling, least))
 
 
 def _effectiveness(c: Chain) -> None:
-    share = 1 + c.p["effectiveness_step"] * after(c.time, c.p["effectiveness_time"])
+    share = 1 + c.p["effectiveness_step"] * after(c, c.p["effectiveness_time"])
     c.plane, c.change = c.plane * share, c.change * share
 
 
@@ -168,12 +169,14 @@ EFFECTS = (
         parameters=(
             Parameter(name="stall_angle", unit="rad", lower=0.01, upper=1.5, meaning="where lift breaks"),
             Parameter(name="stall_loss", unit="1", lower=0.5, upper=3, meaning="1: flat, more: falling lift"),
+            Parameter(name="stall_share", unit="1", lower=0, upper=1, meaning="of the greatest lift, kept"),
         ),
         sentence="Beyond an angle the plane stalls: its lift no longer grows.",
-        equation="acting angle = delta - stall_loss (|delta| - stall_angle)+ sign(delta)",
+        equation="beyond: |acting angle| = max(|delta| - stall_loss (|delta| - stall_angle), "
+        "stall_share stall_angle)",
         manoeuvre="plane steps of increasing size beyond the stall angle",
-        probes=((0.2, 1.2), (0.45, 1.3), (0.75, 1.6)),
-        scales=("rudder", ""),
+        probes=((0.2, 1.2, 0.6), (0.45, 1.3, 0.6), (0.75, 1.6, 0.6)),
+        scales=("rudder", "", ""),
         sizes=(),
         plane=_stall,
     ),

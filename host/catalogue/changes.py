@@ -41,7 +41,7 @@ class Change:
         moment = Parameter(name=time, unit="s", lower=0, upper=1e6, meaning="when it happened")
 
         def come(c: Chain) -> ca.SX:
-            return c.p[size] * after(c.time, c.p[time])
+            return c.p[size] * after(c, c.p[time])
 
         return Effect(
             name=self.name,

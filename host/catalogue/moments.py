@@ -26,7 +26,7 @@ def _changed(c: Chain, like: str) -> ca.SX:
     apart = (c.p[LAST] - c.p[FIRST]) / (COUNT + 1)
     value = ca.SX(0)
     for k, name in enumerate(sizes(like), start=1):
-        value += c.p[name] * after(c.time, c.p[FIRST] + k * apart)
+        value += c.p[name] * after(c, c.p[FIRST] + k * apart)
     return value
 
 

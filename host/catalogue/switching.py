@@ -2,12 +2,13 @@
 
 import casadi as ca
 
-RISE = 0.4  # s, of a change that in truth takes no time; shorter than any response of the vehicle
+from host.equations import Chain
 
 
-def after(time: ca.SX, moment: ca.SX) -> ca.SX:
-    """0 before the moment, 1 after it."""
-    return 0.5 * (1 + ca.tanh((time - moment) / RISE))
+def after(c: Chain, moment: ca.SX) -> ca.SX:
+    """0 before the moment, 1 after it, risen within about a row; a plane is held for a sub-step."""
+    middle = c.time + 0.5 * c.substep
+    return 0.5 * (1 + ca.tanh(2.0 * (middle - moment) / c.interval))
 
 
 def limited(value: ca.SX, bound: ca.SX) -> ca.SX:

@@ -18,7 +18,7 @@ def compressed(c: Chain) -> ca.SX:
 
 def ballast(c: Chain) -> ca.SX:
     """Of a change at one moment."""
-    return c.p["c_wb"] * after(c.time, c.p["ballast_time"])
+    return c.p["c_wb"] * after(c, c.p["ballast_time"])
 
 
 _PARTS = {"c_w0": constant, "c_wz": compressed, "c_wb": ballast}

@@ -19,7 +19,8 @@ def charged_bic(fit: Fit, names: Names, coefficients: int, longest: Recording) -
     """Bayesian information criterion of a fit with so many free coefficients of effects; lower is better.
 
     Charged as well: a speed, a damping or a coupling that is hardly likely, what not every vehicle has, or
-    not by itself, and the choice among all the periods that an oscillation could have had.
+    not by itself, and the choice among all the periods that an oscillation could have had. Not charged: what
+    beside an effect's other coefficients makes no difference on this recording.
 
     longest  of the recordings, which tells most periods apart
     """
@@ -27,7 +28,16 @@ def charged_bic(fit: Fit, names: Names, coefficients: int, longest: Recording) -
     unlikely = -2.0 * log_prior(fit) + _strange_coupling(fit)
     chosen = sum(2.0 * log(_periods_within(named(name).periods, longest)) for name in names)
     lonely = sum(not {named(name).beside} <= names | {None} for name in names)
-    return fit.bic + coefficients * log(fit.samples) + RARITY * rare + LONELY * lonely + unlikely + chosen
+    told = coefficients - _untold(fit, names)
+    return fit.bic + told * log(fit.samples) + RARITY * rare + LONELY * lonely + unlikely + chosen
+
+
+def _untold(fit: Fit, names: Names) -> int:
+    """How many coefficients lack information, as the lift that a plane keeps in a stall it did not reach."""
+    is_told = dict(zip(fit.structure.names, np.diag(fit.information) > 0.0, strict=True))
+    free = {name for name, is_free in zip(fit.structure.names, fit.free, strict=True) if is_free}
+    own = [[is_told[p.name] for p in named(name).parameters if p.name in free] for name in names]
+    return sum(told.count(False) for told in own if any(told))
 
 
 def _strange_coupling(fit: Fit) -> float:

@@ -23,10 +23,13 @@ def deviations(fitter: Fitter, explanation: Explanation) -> dict[str, float]:
     """Standard deviations of all coefficients by name.
 
     A moment drawn anywhere in the recording would deviate by duration / sqrt(12), one drawn between two rows,
-    of which no row tells more, by step / sqrt(12).
+    of which no row tells more, by step / sqrt(12); a coefficient of which the recording tells nothing, drawn
+    between its bounds, by their distance / sqrt(12).
     """
     structure = explanation.fit.structure
-    std = dict(zip(structure.names, np.sqrt(np.diag(covariance(explanation.fit))).tolist(), strict=True))
+    widths = np.array([p.upper - p.lower for p in structure.parameters])
+    found = np.minimum(np.sqrt(np.diag(covariance(explanation.fit))), widths / np.sqrt(12.0))
+    std = dict(zip(structure.names, found.tolist(), strict=True))
     least = fitter.recordings[0].step / np.sqrt(12.0)
     most = max(recording.duration for recording in fitter.recordings) / np.sqrt(12.0)
     free = {name for name, is_free in zip(structure.names, explanation.fit.free, strict=True) if is_free}

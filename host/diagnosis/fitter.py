@@ -15,7 +15,7 @@ from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations
 from host.diagnosis.prospects import form_gains, gain
 from host.diagnosis.spans import ALARM_LATE
-from host.diagnosis.starts import guess, idle, is_far, scanned, starts_of, with_usual_pitch
+from host.diagnosis.starts import guess, idle, is_far, scanned, starts_again, starts_of
 from host.diagnosis.trims import HELD, retrimmed, trimmed
 from host.equations import NAMES, Effect
 from host.filter_error import filter_error_from
@@ -27,15 +27,11 @@ from host.output_error import annealed, free_run_cost, output_error
 from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
 from host.recording import Array, Recording
 from host.rounding import NO_STEPS, thinned
-from host.speed_error import speed_error
+from host.speed_error import speed_errors
 from host.valleys import (
-    SHARING_POLES,
-    has_usual_heave,
-    look_alikes,
     other_valleys,
     plausibility,
     with_rivals,
-    with_usual_heave,
 )
 from host.waves import in_waves_from
 
@@ -62,11 +58,10 @@ class Fitter:
     def __init__(self, recordings: list[Recording], known: Explanation | None = None) -> None:
         self.floor = noise_floor(recordings)
         self.recordings = recordings
-        self.steps = resolution(recordings)
+        self._speed_errors, self.steps = speed_errors(recordings, self.floor[1], resolution(recordings))
         self.thinned = thinned(recordings)
         self._told = thinned(recordings, self.steps)
         self.accelerations = accelerations(self.thinned)
-        self._speed_errors = [speed_error(recording, self.floor[1]) for recording in recordings]
         self.held = dict(HELD)
         if recordings[0].has_speed:
             self.held["u0"] = float(np.mean([r.speed.mean() for r in recordings]))
@@ -118,7 +113,7 @@ class Fitter:
         """The parent's set with one effect more, from the two most promising of its start values.
 
         And where the parent may be bent into another valley than the truth, from what needs no parent; where
-        the end may lie in another, from points of much the same motion, or with the heave of a usual vehicle.
+        the end may lie in another, from other points.
 
         values  start values of the effect's parameters from elsewhere, beside its own probes
         rival   the parent's set with another effect that does the same work: a start there, too, as the
@@ -128,11 +123,7 @@ class Fitter:
         fit = self.fitted(starts)
         if parent.fit.has_process_noise:
             return self.explained(parent.names | {name}, fit)
-        end = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
-        again = look_alikes(end) if named(name).parameters[0].name in SHARING_POLES else []
-        if not has_usual_heave(end):
-            again += with_usual_heave(end)
-        again += with_usual_pitch(self, parent, name, values)
+        again = starts_again(self, parent, name, values, self.explained(parent.names | {name}, fit))
         others = [self.fitted([start], fit, PATIENT_ITERATIONS) for start in again]
         fit = max([fit, *others], key=plausibility)
         if named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:

@@ -5,6 +5,7 @@ truth to make up for it. So a set begins from several places, goes a few steps f
 """
 
 from dataclasses import replace
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,17 +16,19 @@ from host.catalogue.moments import FIRST, LAST
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import first_guess
 from host.diagnosis.margins import LARGEST_SET
-from host.diagnosis.prospects import probed
-from host.gauss_newton import Point
+from host.diagnosis.prospects import probed, whitened_at
+from host.gauss_newton import GaussNewton, Point
 from host.output_error import annealed, free_run_cost
 from host.recording import Array
-from host.valleys import A2, A3, B2, has_usual_heave, with_usual_heave
+from host.valleys import A2, A3, B2, SHARING_POLES, has_usual_heave, look_alikes, with_usual_heave
 
 if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
 
 FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
 SCANS_OF_A_MOMENT = (24, 96)  # times, the second between the neighbours of the best
+NEAR_A_MOMENT, NEARBY = 0.06, 40  # of the recording to either side, and places there
+CLEARLY = 4.0  # of a deviance: more than rounding
 FEW = 1  # members of a set, the free trim among them, that lacks the most
 SLUGGISH, USUAL_PITCH_DAMPING = -0.3, -3.0  # 1/s, of a2: a base that lacks a slow plane is a slow hull
 
@@ -47,6 +50,21 @@ def starts_of(
     if not has_usual_heave(starts[0]):
         starts += [usual for start in starts for usual in with_usual_heave(start)]
     return starts + guesses
+
+
+def starts_again(
+    fitter: "Fitter", parent: Explanation, name: str, values: list[Array], end: Explanation
+) -> list[Point]:
+    """Starts of the same set where the end of its first fit may lie in a poor valley.
+
+    Points of much the same motion, or with the heave or the pitch of a usual vehicle, or with other moments.
+    """
+    fit = end.fit
+    at = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+    starts = look_alikes(at) if named(name).parameters[0].name in SHARING_POLES else []
+    if not has_usual_heave(at):
+        starts += with_usual_heave(at)
+    return starts + with_usual_pitch(fitter, parent, name, values) + with_other_moments(fitter, end)
 
 
 def idle(start: Point, name: str) -> Point:
@@ -72,6 +90,26 @@ def scanned(fitter: "Fitter", start: Point) -> Point:
             start = min(tried, key=lambda point: free_run_cost(point, inputs))
             first, last = start.parameters[k] - apart, start.parameters[k] + apart
     return start
+
+
+def with_other_moments(fitter: "Fitter", end: Explanation) -> list[Point]:
+    """For each moment of a fit the likeliest near it, all else one step ahead, where likelier than its end.
+
+    Where the plane moves much a moment has a maximum in every rest of it.
+    """
+    fit, inputs = end.fit, fitter.inputs(end.names)
+    reach, own, starts = NEAR_A_MOMENT * (fitter.held[LAST] - fitter.held[FIRST]), fit.structure.names, []
+    for k in (k for k, name in enumerate(own) if name in fit.structure.moments and fit.free[k]):
+        others = fit.free & (np.arange(len(own)) != k)
+        at = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
+        near = [_with_value(at, k, fit.parameters[k] + shift) for shift in np.linspace(-reach, reach, NEARBY)]
+        costs = []
+        for point in near:
+            white, cost = whitened_at(point, inputs, end)
+            costs.append(GaussNewton(white, point, others).predicted_cost(cost) if np.isfinite(cost) else inf)
+        if min(costs) < fit.deviance - CLEARLY:
+            starts.append(near[int(np.argmin(costs))])
+    return starts
 
 
 def _with_value(point: Point, k: int, value: float) -> Point:

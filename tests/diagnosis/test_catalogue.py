@@ -115,6 +115,24 @@ def test_the_zero_error_of_a_plane_lies_behind_its_stops() -> None:
     np.testing.assert_allclose(run.outputs, true.outputs, atol=1e-9)
 
 
+@pytest.mark.parametrize("share", [0.0, 0.4, 0.9])
+def test_a_stalled_plane_keeps_a_share_of_its_greatest_lift(share: float) -> None:
+    rows = hidden_dive(duration=30.0)
+    stalled = inputs_of(rows, structure_of(("rudder_stall",)))
+    stall = {"stall_angle": 0.05, "stall_loss": 1.5, "stall_share": share}
+    values = dict.fromkeys(stalled.structure.names, 0.0) | BASE | stall
+    run = free_run(np.array([values[name] for name in stalled.structure.names]), START, stalled)
+    size = np.abs(rows.rudder)
+    lift = np.where(size < 0.05, size, np.maximum(0.05 - 0.5 * (size - 0.05), share * 0.05))
+    true = free_run(
+        np.array([*BASE.values(), 0.0, 0.0]),
+        START,
+        inputs_of(replace(rows, rudder=np.sign(rows.rudder) * lift)),
+    )
+    np.testing.assert_allclose(run.outputs, true.outputs, atol=1e-9)
+    assert size.max() > 0.1
+
+
 @pytest.mark.parametrize("lag", [0.05, 0.6])
 def test_a_slow_depth_sensor_feels_the_depth_where_it_sits(lag: float) -> None:
     rows, names = hidden_dive(duration=30.0), ("depth_sensor_lag", "depth_sensor_lever_arm")

@@ -10,7 +10,7 @@ from host.maximum_likelihood import fit_maximum_likelihood
 from host.propagate import free_run, inputs_of
 from host.recording import Array, Recording
 from host.speed import smoothed_speed
-from host.speed_error import SpeedError, speed_error
+from host.speed_error import SpeedError, speed_error, speed_errors
 
 BASE = np.array([-0.63084, -3.38699, -8.19858, 0.41385, -3.94120, 1.5, 0.0, 0.0])
 DEPTH_NOISE, PITCH_NOISE, SPEED_NOISE = 0.005, 0.001, 0.05
@@ -91,3 +91,14 @@ def test_intervals_hold_when_the_speed_sensor_is_noisy() -> None:
         left.append(np.sqrt(fit.noise[1]) / DEPTH_NOISE)
     assert 0.6 < float(np.sqrt(np.mean(np.square(apart)))) < 1.4
     assert float(np.mean(left)) == pytest.approx(1.0, abs=0.15)
+
+
+def test_rounded_depth_that_errors_of_the_speed_move_is_no_longer_told_by_intervals() -> None:
+    recording = dive(np.random.default_rng(3))
+    coarse = replace(recording, depth=np.round(recording.depth, 1))
+    steps = np.array([0.01, 0.1])
+    (error,), told = speed_errors([coarse], 0.1**2 / 12.0, steps)
+    assert error is not None
+    assert told.tolist() == [0.01, 0.0]
+    still = replace(coarse, speed=np.full(coarse.time.size, 1.5))
+    assert speed_errors([still], 0.1**2 / 12.0, steps) == ([None], steps)

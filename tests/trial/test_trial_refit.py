@@ -77,12 +77,14 @@ def test_claimed_coefficients_have_names_of_the_catalogue(name: str) -> None:
         assert not claimed
     else:
         assert set(claimed) <= {parameter.name for parameter in BY_NAME[name].parameters}
-        assert claimed or name in ("speed_loss", "surface_waves", "rudder_stall")
+        assert claimed or name in ("speed_loss", "surface_waves")
 
 
-def test_a_stall_that_reaches_its_floor_has_no_coefficients_in_the_catalogues_form() -> None:
+def test_the_lift_that_a_stalled_plane_keeps_is_claimed_where_it_is_reached() -> None:
     rng = np.random.default_rng(3)
     setting = Setting(vehicle=draw_vehicle(rng), command=0.3, pitch=0.1, duration_s=60.0, step_s=0.02)
     stall = draw_hidden(rng, "rudder_stall", setting)
-    assert not true_coefficients(replace(stall, strength=0.99), setting, (0.0, 1.0))
-    assert true_coefficients(replace(stall, strength=0.5), setting, (0.0, 1.0))["stall_loss"] == 1.5
+    deep, slight = (true_coefficients(replace(stall, strength=s), setting, (0.0, 1.0)) for s in (0.99, 0.5))
+    assert deep["stall_loss"] == slight["stall_loss"] == 1.5
+    assert deep["stall_share"] == 0.5
+    assert "stall_share" not in slight

@@ -1,6 +1,6 @@
 """From the plant's units to the coefficients of motion per unit mass, where the form is the same."""
 
-from tools.sitl.actuator import STALL_SLOPE
+from tools.sitl.actuator import STALL_FLOOR, STALL_SLOPE
 from tools.sitl.hull import GRAVITY
 from tools.trial.hidden import Hidden, Setting
 
@@ -38,9 +38,9 @@ def true_coefficients(effect: Hidden, setting: Setting, sea_phase: tuple[float, 
         case "munk_moment":
             return {"c_qw": size * (hull.Xudot - hull.Zwdot) * u / inertia}
         case "rudder_stall":
-            # Beyond twice the stall angle the plant's lift falls no further; the catalogue's does.
-            reaches_floor = setting.command > 2.0 * size
-            return {} if reaches_floor else {"stall_angle": size, "stall_loss": 1.0 - STALL_SLOPE}
+            falls_to = (1.0 - STALL_FLOOR) / -STALL_SLOPE  # times the stall angle beyond it
+            kept = {"stall_share": STALL_FLOOR} if setting.command > (1.0 + falls_to) * size else {}
+            return {"stall_angle": size, "stall_loss": 1.0 - STALL_SLOPE} | kept
         case "rudder_effectiveness_change":
             return {"effectiveness_step": -size, "effectiveness_time": effect.at_s}
         case "internal_wave":

@@ -1,0 +1,39 @@
+"""Coefficients of which a recording tells nothing are not charged, and known no better than their bounds."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hidden_dive import hidden_dive
+
+from host.diagnosis.deviations import deviations
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import Fitter
+from host.fit import Fit
+
+STALL = frozenset({"rudder_stall"})
+
+
+def blind_to(fit: Fit, *names: str) -> Fit:
+    seen = ~np.isin(fit.structure.names, names)
+    return replace(fit, information=fit.information * np.outer(seen, seen))
+
+
+@pytest.fixture(scope="module")
+def fitter() -> Fitter:
+    return Fitter([hidden_dive(duration=60.0)])
+
+
+def test_what_makes_no_difference_is_charged_only_where_all_of_an_effect_does_not(fitter: Fitter) -> None:
+    fit = replace(fitter.grown(fitter.base, "rudder_stall", []).fit, information=np.eye(11))
+    whole = fitter.bic(fit, STALL)
+    less = fitter.bic(blind_to(fit, "stall_share"), STALL)
+    assert whole - less == pytest.approx(np.log(fit.samples))
+    assert fitter.bic(blind_to(fit, "stall_angle", "stall_loss", "stall_share"), STALL) == whole
+
+
+def test_what_is_not_told_deviates_as_if_drawn_between_its_bounds(fitter: Fitter) -> None:
+    found = fitter.grown(fitter.base, "rudder_stall", [])
+    fit = blind_to(found.fit, "stall_share")
+    std = deviations(fitter, Explanation(STALL, fit, found.bic))
+    assert std["stall_share"] == pytest.approx(1.0 / np.sqrt(12.0))
