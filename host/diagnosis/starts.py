@@ -17,7 +17,7 @@ from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import first_guess
 from host.diagnosis.margins import LARGEST_SET
 from host.diagnosis.prospects import probed, whitened_at
-from host.gauss_newton import GaussNewton, Point
+from host.gauss_newton import GaussNewton, Mask, Point
 from host.output_error import annealed, free_run_cost
 from host.recording import Array
 from host.valleys import A2, A3, B2, SHARING_POLES, has_usual_heave, look_alikes, with_usual_heave
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 FAR = 5.0  # times the noise floor: a base bent so far may sit in another valley than the truth
 SCANS_OF_A_MOMENT = (24, 96)  # times, the second between the neighbours of the best
-NEAR_A_MOMENT, NEARBY = 0.06, 40  # of the recording to either side, and places there
+NEAR_A_MOMENT, NEARBY = 0.06, (40, 9)  # of the recording to either side; places there, and beside the best
 CLEARLY = 4.0  # of a deviance: more than rounding
 FEW = 1  # members of a set, the free trim among them, that lacks the most
 SLUGGISH, USUAL_PITCH_DAMPING = -0.3, -3.0  # 1/s, of a2: a base that lacks a slow plane is a slow hull
@@ -98,17 +98,24 @@ def with_other_moments(fitter: "Fitter", end: Explanation) -> list[Point]:
     Where the plane moves much a moment has a maximum in every rest of it.
     """
     fit, inputs = end.fit, fitter.inputs(end.names)
-    reach, own, starts = NEAR_A_MOMENT * (fitter.held[LAST] - fitter.held[FIRST]), fit.structure.names, []
-    for k in (k for k, name in enumerate(own) if name in fit.structure.moments and fit.free[k]):
-        others = fit.free & (np.arange(len(own)) != k)
-        at = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
-        near = [_with_value(at, k, fit.parameters[k] + shift) for shift in np.linspace(-reach, reach, NEARBY)]
-        costs = []
-        for point in near:
+    at = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
+    starts = []
+    for k, name in enumerate(fit.structure.names):
+        if name not in fit.structure.moments or not fit.free[k]:
+            continue
+        others = fit.free & (np.arange(fit.free.size) != k)
+
+        def foretold(point: Point, others: Mask = others) -> float:
             white, cost = whitened_at(point, inputs, end)
-            costs.append(GaussNewton(white, point, others).predicted_cost(cost) if np.isfinite(cost) else inf)
-        if min(costs) < fit.deviance - CLEARLY:
-            starts.append(near[int(np.argmin(costs))])
+            return GaussNewton(white, point, others).predicted_cost(cost) if np.isfinite(cost) else inf
+
+        best, reach = at, NEAR_A_MOMENT * (fitter.held[LAST] - fitter.held[FIRST])
+        for count in NEARBY:
+            shifts = np.linspace(-reach, reach, count)
+            near = [_with_value(best, k, best.parameters[k] + shift) for shift in shifts]
+            best, reach = min(near, key=foretold), 2.0 * reach / count
+        if foretold(best) < fit.deviance - CLEARLY:
+            starts.append(best)
     return starts
 
 

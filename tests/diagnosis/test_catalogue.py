@@ -115,6 +115,19 @@ def test_the_zero_error_of_a_plane_lies_behind_its_stops() -> None:
     np.testing.assert_allclose(run.outputs, true.outputs, atol=1e-9)
 
 
+def test_a_plane_that_is_damaged_as_it_moves_loses_its_force_within_a_row() -> None:
+    rows = hidden_dive(duration=30.0)
+    moves = rows.time[1:][np.diff(rows.rudder) != 0.0]
+    moment = float(moves[moves > 10.0][0])
+    damaged = inputs_of(rows, structure_of(("rudder_effectiveness_change",)))
+    run = free_run(np.array([*BASE.values(), 0.0, 0.0, -0.3, moment]), START, damaged).outputs
+    whole = np.array([*BASE.values(), 0.0, 0.0])
+    lost = np.where(rows.time > moment - 0.01, 0.7, 1.0) * rows.rudder
+    true = free_run(whole, START, inputs_of(replace(rows, rudder=lost))).outputs
+    without = free_run(whole, START, inputs_of(rows)).outputs
+    assert np.abs(run - true).max() < 0.02 * np.abs(without - true).max()
+
+
 @pytest.mark.parametrize("share", [0.0, 0.4, 0.9])
 def test_a_stalled_plane_keeps_a_share_of_its_greatest_lift(share: float) -> None:
     rows = hidden_dive(duration=30.0)

@@ -11,7 +11,7 @@ from host.diagnosis.deviations import deviations
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.prospects import probed
-from host.diagnosis.starts import SLUGGISH, with_usual_heave, with_usual_pitch
+from host.diagnosis.starts import SLUGGISH, with_other_moments, with_usual_heave, with_usual_pitch
 from host.gauss_newton import Point
 from host.output_error import output_error
 from host.propagate import free_run, inputs_of
@@ -82,6 +82,22 @@ def test_a_moment_that_lay_between_the_stretches_fitted_first_is_found_on_all_of
     again = fitter.refitted(unsettled)
     assert again.fit.parameters[index] == pytest.approx(WEAKENED_AT, abs=0.1)
     assert 0.02 < deviations(fitter, again)["effectiveness_time"] < 0.1
+
+
+def test_a_fit_that_ended_in_another_rest_of_the_plane_begins_again_at_the_right_moment() -> None:
+    def lamed(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+        lost = -0.5 * plane * (time > WEAKENED_AT)
+        return lost * BASE["b1"], lost * BASE["b2"], 0.0
+
+    fitter, names = Fitter([hidden_dive(lamed)]), frozenset({"rudder_effectiveness_change"})
+    stuck, right = (
+        fitter.explained(names, fitter.carried_on(fitter.point(names, fitter.base, *names, np.array(values))))
+        for values in ([-0.5, WEAKENED_AT + 4.5], [-0.5, WEAKENED_AT])
+    )
+    assert stuck.fit.parameters[-1] > WEAKENED_AT + 3.0
+    (again,) = with_other_moments(fitter, stuck)
+    assert fitter.carried_on(again).parameters[-1] == pytest.approx(WEAKENED_AT, abs=0.1)
+    assert with_other_moments(fitter, right) == []
 
 
 def test_a_moment_at_which_the_plane_rested_may_be_anywhere_in_that_rest() -> None:
