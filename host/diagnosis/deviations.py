@@ -11,6 +11,7 @@ import numpy as np
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.prospects import whitened_at
+from host.equations import Effect
 from host.gauss_newton import GaussNewton, Point
 from host.uncertainty import covariance
 from host.whiteness import correlation_factor
@@ -37,6 +38,13 @@ def deviations(fitter: Fitter, explanation: Explanation) -> dict[str, float]:
         reach = max(_reach(fitter, explanation, name, side) for side in (-1.0, 1.0))
         std[name] = float(np.clip(reach / HALF_WIDTH, least, most))
     return std
+
+
+def interval(effect: Effect, name: str, value: float, std: float) -> tuple[float, float]:
+    """Between which values a coefficient of the effect lies, 95 times in 100, its bounds known."""
+    bounds = next((p.lower, p.upper) for p in effect.parameters if p.name == name)
+    low, high = np.clip([value - HALF_WIDTH * std, value + HALF_WIDTH * std], *bounds)
+    return float(low), float(high)
 
 
 def _reach(fitter: Fitter, explanation: Explanation, name: str, side: float) -> float:

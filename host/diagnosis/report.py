@@ -9,7 +9,7 @@ from jinja2 import Environment, FileSystemLoader, select_autoescape
 from host.catalogue import BY_NAME
 from host.catalogue.moments import SCANS
 from host.diagnosis.answer import Answer
-from host.diagnosis.deviations import HALF_WIDTH
+from host.diagnosis.deviations import interval
 from host.diagnosis.diagnose import Diagnosis, NamedEffect
 from host.diagnosis.pictures import (
     base_name,
@@ -154,7 +154,7 @@ def _effect(effect: NamedEffect, answer: Answer) -> dict[str, Any]:
             {
                 "name": name,
                 "value": f"{value:.4g}",
-                "interval": f"{value - HALF_WIDTH * std:.4g} to {value + HALF_WIDTH * std:.4g}",
+                "interval": "{:.4g} to {:.4g}".format(*interval(entry, name, value, std)),
                 "unit": unit,
             }
             for name, (value, std, unit) in effect.coefficients.items()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from hidden_dive import hidden_dive
 
-from host.diagnosis.deviations import deviations
+from host.catalogue import named
+from host.diagnosis.deviations import deviations, interval
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.fit import Fit
@@ -37,3 +38,10 @@ def test_what_is_not_told_deviates_as_if_drawn_between_its_bounds(fitter: Fitter
     fit = blind_to(found.fit, "stall_share")
     std = deviations(fitter, Explanation(STALL, fit, found.bic))
     assert std["stall_share"] == pytest.approx(1.0 / np.sqrt(12.0))
+
+
+def test_an_interval_ends_at_the_bounds_of_its_coefficient() -> None:
+    assert interval(named("rudder_stall"), "stall_share", 0.6, 0.289) == pytest.approx(
+        (0.0336, 1.0), abs=1e-3
+    )
+    assert interval(named("trim_moment"), "c_q0", 0.0, 1.0) == pytest.approx((-1.96, 1.96))

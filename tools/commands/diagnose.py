@@ -66,8 +66,9 @@ def run(args: argparse.Namespace) -> int:
     model = read_model(args.model) if args.model is not None else None
     with progress(args.quiet) as say:
         recordings = _part(read_all(args.recordings, vehicle, say), args)
+        from host.catalogue import named
         from host.diagnosis.answer import Answer
-        from host.diagnosis.deviations import HALF_WIDTH
+        from host.diagnosis.deviations import interval
         from host.diagnosis.diagnose import diagnose
         from host.diagnosis.files import write_diagnosis, write_extended_model
         from host.diagnosis.given_model import against_model
@@ -101,9 +102,9 @@ def run(args: argparse.Namespace) -> int:
         print(f"  {effect.name}{twins}")
         for name, (value, std, unit) in effect.coefficients.items():
             if std > 0.0:  # else it was measured, not estimated
-                low, high = value - HALF_WIDTH * std, value + HALF_WIDTH * std
-                told = f"{value:+.5g} {'' if unit == '1' else unit}"
-                print(f"    {name:24s} {told}  (95 %: {low:+.5g} to {high:+.5g})")
+                low, high = interval(named(effect.name), name, value, std)
+                unit = "" if unit == "1" else f" {unit}"
+                print(f"    {name:24s} {value:+.5g}{unit}  (95 %: {low:+.5g} to {high:+.5g})")
         for separation in answer.separating(effect.name):
             print(f"    {separation.sentence}")
     print(f"  {found.remaining}")
