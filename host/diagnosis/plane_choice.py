@@ -52,24 +52,21 @@ def ways(recordings: list[Recording]) -> list[Way]:
 
 
 def by_single_effects(found: list[Way], on_progress: Callable[[str], None], jobs: int) -> list[Way]:
-    """The ways in order, the likelier first, as the effects see them that explain most alone.
+    """The ways, the likelier first, as the effects see them that explain most alone.
 
     The base equations bend towards what they lack, and may follow the wrong way better by chance.
     """
-    leading, *rest = found
-    if not rest or leading.waves is not None:
+    leading = found[0]
+    if len(found) == 1 or leading.waves is not None:
         return found
     with Workers(leading.fitter, jobs) as workers:
         search = Search(leading.fitter, workers, on_progress, leading.fitter.base, leading.fitter.root)
         leading = leading._replace(alone=tuple(search.singles()))
     best = sorted(leading.alone, key=lambda e: e.bic)[:LEADING]
     least = min(leading.fitter.root.bic, best[0].bic) - NAMING_MARGIN
-    likelier = [
-        way
-        for way in rest
-        if way.fitter.root.bic < least or any(way.fitter.reduced(e, e.names).bic < least for e in best)
-    ]
-    return [*likelier, leading, *(way for way in rest if way not in likelier)]
+    other = found[1]
+    there = (other.fitter.root.bic, *(other.fitter.reduced(e, e.names).bic for e in best))
+    return [other, leading] if min(there) < least else [leading, other]
 
 
 def is_likelier(other: Way, search: Search, best: Explanation) -> bool:

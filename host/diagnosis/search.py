@@ -141,7 +141,7 @@ class Search:
         return "grown", (parent, name, self.values(name))
 
     def shrink(self, explanation: Explanation, smaller: Iterable[Names]) -> None:
-        """Fits sets of one member less roughly, once; again from a set without which they fell behind."""
+        """Fits sets of one member less roughly, once; again from a larger set that foretells more."""
         new = [
             names for names in smaller if names not in self._shrunk or self._falls_behind(names, explanation)
         ]
