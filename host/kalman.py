@@ -7,7 +7,8 @@ import casadi as ca
 import numpy as np
 
 from host.equations import Structure
-from host.propagate import KEPT, Form, Inputs, form_of, over_rows, start_of
+from host.over_rows import KEPT, over_rows
+from host.propagate import Form, Inputs, form_of, start_of
 from host.recording import Array
 
 

@@ -8,12 +8,12 @@ resolution.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from host.equations import BASE, STATES, Chain, Structure
+from host.over_rows import KEPT, over_rows
 from host.recording import Array, Recording
 from host.speed import smoothed_speed
 from host.speed_error import SpeedError
@@ -22,8 +22,6 @@ NX0 = len(STATES)
 MOST_SUBSTEPS = 8  # slow records show no modes faster than their sampling: finer steps would resolve nothing
 LONGEST_SUBSTEP = 0.05  # s; for a 10 rad/s mode the error of one sub-step is below 3e-4 of its change
 LONGEST_DELAY = 1.0  # s; how far back commands are looked up
-ROWS_AT_ONCE = 256
-KEPT = 64  # functions of each kind: a search meets hundreds of sets, and those of all would fill the memory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -189,50 +187,6 @@ def _free_run(form: Form) -> ca.Function:
     x, p, drive = form.symbols()
     *within, after = form.step(x, p, drive)
     return ca.Function("free_run", [x, drive, p], [after, ca.vertcat(x, *within, form.outputs(x, p, drive))])
-
-
-OverRows = Callable[[Array, Array, Array], Array]
-
-
-def over_rows(step: Callable[[Form], ca.Function], form: Form, rows: int) -> OverRows:
-    """One step's function carried over N rows: (start, per row (m, N), parameters) -> results (k, N)."""
-    at_once = min(ROWS_AT_ONCE, 1 << (rows - 1).bit_length())
-    accumulated = _accumulated(step, form, at_once)
-
-    def run(start: Array, per_row: Array, parameters: Array) -> Array:
-        # CasADi reads and writes these arrays in place, column by column; its own matrices would be
-        # copied number by number, which takes as long as the propagation.
-        chunks = -(-rows // at_once)
-        driven = np.zeros((chunks * at_once, per_row.shape[0]))
-        driven[:rows] = per_row.T
-        repeated = np.tile(parameters, (at_once, 1))
-        carried = np.empty((at_once, accumulated.size1_out(0)))
-        out = np.empty((chunks * at_once, accumulated.size1_out(1)))
-        buffer: Any
-        buffer, evaluate = accumulated.buffer()  # typed in C terms: pointer and size
-        buffer.set_arg(2, repeated.data)
-        buffer.set_res(0, carried.data)
-        for first in range(0, chunks * at_once, at_once):
-            begin = np.array(carried[-1]) if first else start
-            buffer.set_arg(0, begin.data)
-            buffer.set_arg(1, driven[first : first + at_once].data)
-            buffer.set_res(1, out[first : first + at_once].data)
-            evaluate()
-        return out[:rows].T
-
-    return run
-
-
-@lru_cache(KEPT)
-def _accumulated(step: Callable[[Form], ca.Function], form: Form, rows: int) -> ca.Function:
-    """Over few rows: CasADi takes longer to build such a function over many than to run it.
-
-    Its results are made dense, as the arrays that it writes into are: what is always zero takes a place, too.
-    """
-    one = step(form)
-    inputs = one.sx_in()
-    dense = ca.Function(one.name(), inputs, [ca.densify(result) for result in one.call(inputs)])
-    return dense.mapaccum(f"rows_{rows}", rows)
 
 
 def form_of(inputs: Inputs) -> Form:

@@ -14,7 +14,8 @@ import casadi as ca
 import numpy as np
 
 from host.all_rows import AllRows
-from host.propagate import KEPT, Form, Inputs, Run, form_of, free_run, over_rows, start_of
+from host.over_rows import KEPT, over_rows
+from host.propagate import Form, Inputs, Run, form_of, free_run, start_of
 from host.recording import Array
 
 

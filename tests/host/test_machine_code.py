@@ -1,0 +1,81 @@
+import shutil
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from exact_dive import TABLE_1, Dive, fly
+
+from host import machine_code, over_rows
+from host.catalogue import BY_NAME
+from host.equations import Structure
+from host.kalman import kalman_pass
+from host.machine_code import as_machine_code
+from host.propagate import free_run, inputs_of
+from host.recording import Array
+
+needs_compiler = pytest.mark.skipif(machine_code.compiler() is None, reason="no C compiler here")
+NOISE = np.array([3e-6, 1e-4, 0.02, 0.05])
+
+
+def with_a_compiler(found: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(machine_code, "compiler", lambda: found)
+
+
+def passes() -> list[Array]:
+    """What a filter and a free run with everything that bends make of 600 rows."""
+    bent = [BY_NAME[name] for name in ("rudder_stall", "actuator_backlash", "large_angle_restoring")]
+    own = [parameter for effect in bent for parameter in effect.parameters]
+    recording, states = fly(Dive(duration=60.0, missing=0.2))
+    inputs = inputs_of(recording, Structure(tuple(bent)))
+    middle = [0.5 * (each.lower + each.upper) for each in own]
+    parameters = np.array([*TABLE_1.values(), 0.0, 0.0, *middle])
+    run = kalman_pass(parameters, states[:, 0], NOISE, inputs)
+    found = [run.error, run.variance, run.gains, free_run(parameters, states[:, 0], inputs).states]
+    assert all(np.isfinite(one).all() for one in found)
+    return found
+
+
+@needs_compiler
+def test_compiled_runs_have_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    over_rows._carried_on.cache_clear()
+    monkeypatch.setattr(over_rows, "FEW_ROWS", np.inf)
+    interpreted = passes()
+    over_rows._carried_on.cache_clear()
+    monkeypatch.setattr(over_rows, "FEW_ROWS", 0.0)
+    monkeypatch.setattr(over_rows, "FEW_INSTRUCTIONS", 1.0)
+    compiled: list[str] = []
+
+    def watched(function: ca.Function) -> ca.Function | None:
+        compiled.append(function.name())
+        return as_machine_code(function)
+
+    monkeypatch.setattr(over_rows, "as_machine_code", watched)
+    for _ in range(2):
+        for expected, found in zip(interpreted, passes(), strict=True):
+            np.testing.assert_array_equal(found, expected)
+    assert sorted(compiled) == ["free_run", "kalman"]
+    over_rows._carried_on.cache_clear()
+
+
+def test_without_a_compiler_there_is_no_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    with_a_compiler(None, monkeypatch)
+    x = ca.SX.sym("x")
+    assert as_machine_code(ca.Function("twice", [x], [2.0 * x])) is None
+
+
+@pytest.mark.parametrize("name", ["false", "gone"])
+def test_a_compiler_that_does_not_work_is_none(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    with_a_compiler(shutil.which(name) or str(Path("/") / name), monkeypatch)
+    x = ca.SX.sym("x")
+    assert as_machine_code(ca.Function("twice", [x], [2.0 * x])) is None
+
+
+@needs_compiler
+def test_a_compiled_function_outlives_its_file() -> None:
+    x, y = ca.SX.sym("x", 2), ca.SX.sym("y")
+    function = ca.Function("both", [x, y], [x * y, ca.sin(x[0]) + y])
+    compiled = as_machine_code(function)
+    assert compiled is not None
+    for found, expected in zip(compiled([1.0, 2.0], 3.0), function([1.0, 2.0], 3.0), strict=True):
+        np.testing.assert_array_equal(np.array(found), np.array(expected))
