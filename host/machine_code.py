@@ -1,21 +1,24 @@
-"""Functions of CasADi as machine code, where the computer has a C compiler.
+"""Machine code, where the computer has a C compiler.
 
 CasADi goes through a function's instructions one by one, which takes ten times as long as what a compiler
-makes of them. It is the same operations in the same order, so the results have the same bits: nothing that
-is found depends on whether there is a compiler.
+makes of them. It is the same operations in the same order, so the results have the same bits.
 """
 
 import shutil
 import subprocess
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TypeVar
 
 import casadi as ca
 
-# Nothing may be reordered, nor a product and a sum be rounded at once.
-FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")
+# No product and sum may be rounded at once, as some compilers do by themselves.
+FLAGS = ("-fPIC", "-shared", "-ffp-contract=off")
 LONGEST = 60.0  # s, a compiler may take
+
+T = TypeVar("T")
 
 
 @cache
@@ -24,19 +27,26 @@ def compiler() -> str | None:
     return next((found for name in ("cc", "gcc", "clang") if (found := shutil.which(name))), None)
 
 
-def as_machine_code(function: ca.Function) -> ca.Function | None:
-    """The same function compiled; None where there is no compiler, or it does not work."""
+def compiled(source: str, load: Callable[[str], T], effort: str = "-O1") -> T | None:
+    """What `load` makes of a library compiled from C; None where there is no compiler, or it does not work.
+
+    The library's file may go once it is loaded.
+    """
     if (found := compiler()) is None:
         return None
     with TemporaryDirectory() as folder:
-        source, library = Path(folder, "function.c"), Path(folder, "function.so")
-        generator = ca.CodeGenerator(source.name)
-        generator.add(function)
-        generator.generate(f"{folder}/")
+        text, library = Path(folder, "source.c"), Path(folder, "library.so")
+        text.write_text(source, encoding="utf-8")
+        command = [found, effort, *FLAGS, "-o", str(library), str(text)]
         try:
-            subprocess.run(
-                [found, *FLAGS, "-o", library, source], check=True, capture_output=True, timeout=LONGEST
-            )
-            return ca.external(function.name(), str(library))  # the file may go once it is loaded
+            subprocess.run(command, check=True, capture_output=True, timeout=LONGEST)
+            return load(str(library))
         except (OSError, subprocess.SubprocessError, RuntimeError):
             return None
+
+
+def as_machine_code(function: ca.Function) -> ca.Function | None:
+    """The same function compiled, or None."""
+    generator = ca.CodeGenerator("function")
+    generator.add(function)
+    return compiled(generator.dump(), lambda library: ca.external(function.name(), library))

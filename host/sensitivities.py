@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 
 from host.all_rows import AllRows
+from host.linear_recursion import linear_recursion
 from host.over_rows import KEPT, over_rows
 from host.propagate import Form, Inputs, Run, form_of, free_run, start_of
 from host.recording import Array
@@ -48,7 +49,7 @@ def sensitivities(
         if gains is not None:
             FK = Fx @ gains.T.reshape((rows, 2, form.nx)).transpose(0, 2, 1)
             Fx, Fp = Fx - FK @ hx, Fp - FK @ hp
-        seen = hx @ _recursion(Fx, Fp, start)
+        seen = hx @ linear_recursion(Fx, Fp, start)
         seen[:, :, : form.np] += hp
         return seen.transpose(1, 2, 0) * inputs.present[:, None, :]
 
@@ -73,15 +74,6 @@ def _slopes_of_rows(form: Form, run: Run, parameters: Array, drive: Array) -> tu
     for by_state, by_parameter in zip(each[0][1:], each[1][1:], strict=True):
         Fx, Fp = by_state @ Fx, by_state @ Fp + by_parameter
     return Fx, Fp
-
-
-def _recursion(Fx: Array, Fp: Array, start: Array) -> Array:
-    """S (N, nx, parameters + 4) with S' = F_x S + F_p from its value at the first row."""
-    S = np.zeros((Fx.shape[0], *start.shape))
-    S[0], S[1:, :, : Fp.shape[2]] = start, Fp[:-1]
-    for slope, now, following in zip(Fx, S, S[1:], strict=False):
-        following += slope.dot(now)
-    return S
 
 
 @lru_cache(KEPT)
