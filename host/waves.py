@@ -37,6 +37,7 @@ BROADEST = 0.4  # of a sea: 0.26 fits the waves of a fully developed one, 0.1 th
 FIRST_DAMPING = 0.1
 FREQUENCIES = np.geomspace(0.3, 4.0, 10)  # rad/s, to begin with; each is within the band of the next
 IN_BAND = 10.0  # times the density of the white forces
+SWINGS = np.array([[0.3, 0.3], [0.3, 0.01], [0.01, 0.3]])  # of depth and pitch, times the sensors' noise
 NEAR = 100.0  # of a log-likelihood below the best, in the same waves, from where it is worth going on
 MOST_STEPS = 25
 FIRST_STEPS = 8  # from starts other than the first, of which most lead nowhere
@@ -190,13 +191,19 @@ def _less_shape(white: list[tuple[Array, Array]], count: int) -> list[tuple[Arra
 
 
 def _first(start: Fit, inputs: list[Inputs]) -> Point:
-    """White forces told as waves of the frequency that suits best."""
-    d, points = FIRST_DAMPING, []
+    """The likeliest of waves as strong as the white forces in their band, or of such as swing a sensor.
+
+    Of weak waves white forces tell nothing: most of what those do is a slow drift, which is not there.
+    """
+    d, a2, points = FIRST_DAMPING, start.parameters[A2], []
     for s in FREQUENCIES:
         # In their band they push harder than white forces, which push everywhere; climb swings with w' / s.
-        driving = IN_BAND * start.noise[2:] * 4.0 * d**2 * s**4 / np.array([s**2, start.parameters[A2] ** 2])
-        levels = np.array([*start.noise[:2], s, d, 0.0, *driving])
-        points.append(Point(start.structure, start.parameters, start.initial, levels))
+        as_forces = IN_BAND * start.noise[2:] * 4.0 * d**2 * s**4 / np.array([s**2, a2**2])
+        # Depth swings by f / s and pitch by a2 g / s, whose variances are density / (4 d s^3).
+        as_noise = 4.0 * d * s**5 * start.noise[1::-1] / np.array([1.0, a2**2])
+        for driving in (as_forces, *(swings**2 * as_noise for swings in SWINGS)):
+            levels = np.array([*start.noise[:2], s, d, 0.0, *driving])
+            points.append(Point(start.structure, start.parameters, start.initial, levels))
     return max(points, key=lambda point: _likelihood(point, inputs))
 
 

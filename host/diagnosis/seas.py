@@ -117,22 +117,25 @@ def among_waves(
     white = plain if plain.fit.has_process_noise else with_sea(fitter, plain)
     named = calm.names & BY_NAME.keys() - {WAVES}
     beside = [with_sea(fitter, fitter.reduced(calm, named))] if named - white.names else []
-    first = min((with_waves(fitter, one) for one in (white, *beside)), key=lambda e: e.bic)
+    first = min(_in_own_waves(rough, [white, *beside]), key=lambda e: e.bic)
     if not is_sea(first.fit):
         return rough, best, None
-    first, least = _lean(fitter, first), as_filtered(fitter, best).bic
+    first, least = _lean(rough, first), as_filtered(fitter, best).bic
     if first.bic > least - NAMING_MARGIN or not is_sea(first.fit):
         return rough, best, None
     return _searched(rough, first, least)
 
 
-def _lean(fitter: Fitter, among: Explanation) -> Explanation:
+def _in_own_waves(search: Search, sets: list[Explanation]) -> list[Explanation]:
+    """Each set among the waves that are likeliest beside it."""
+    return search.workers.results([(with_waves, (one,)) for one in sets])
+
+
+def _lean(search: Search, among: Explanation) -> Explanation:
     """The set less what does not pay once the waves are estimated without it: they may do its work."""
     while among.names:
-        fewer = [
-            with_waves(fitter, fitter.reduced(among, among.names - {name})) for name in sorted(among.names)
-        ]
-        best = min(fewer, key=lambda e: e.bic)
+        fewer = [search.fitter.reduced(among, among.names - {name}) for name in sorted(among.names)]
+        best = min(_in_own_waves(search, fewer), key=lambda e: e.bic)
         if best.bic > among.bic + margin(among):
             break
         among = best
@@ -155,7 +158,7 @@ def _searched(known: Search, first: Explanation, least: float) -> tuple[Search, 
     base, root = (_in_waves_of(fitter, first, one.names) for one in (known.base, known.root))
     search = Search(fitter, known.workers, known.on_progress, base, root, known.part)
     found = search.run([first])
-    fitted = first if found.names == first.names else _lean(fitter, with_waves(fitter, found))
+    fitted = first if found.names == first.names else _lean(search, with_waves(fitter, found))
     for name in sorted(found.names - fitted.names):
         found = search.without(found, name)
     told = Waves(delta_bic=least - first.bic, fitted=fitted, model=with_regular_waves(fitter, fitted))

@@ -12,14 +12,14 @@ from typing import Any
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 
-Task = tuple[str, tuple[Any, ...]]
-"""A method of Fitter and its arguments."""
+Task = tuple[str | Callable[..., Any], tuple[Any, ...]]
+"""A method of Fitter, or a function of a fitter and more, and its arguments."""
 
 _fitter: Fitter
 
 
 class Workers:
-    """Calls methods of a Fitter in order; one job calls them here, more in processes of their own."""
+    """Carries out tasks in order; one job does so here, more in processes of their own."""
 
     def __init__(self, fitter: Fitter, jobs: int) -> None:
         self._fitter = fitter
@@ -43,7 +43,7 @@ class Workers:
         found = []
         if self._pool is None:
             for number, (method, arguments) in enumerate(tasks):
-                found.append(getattr(self._fitter, method)(*arguments))
+                found.append(_done(self._fitter, method, arguments))
                 on_done(number)
             return found
         waiting = [self._pool.submit(_call, method, arguments) for method, arguments in tasks]
@@ -71,6 +71,10 @@ def leave_with_parent() -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def _call(method: str, arguments: tuple[Any, ...]) -> Any:
-    result = getattr(_fitter, method)(*arguments)
+def _call(method: str | Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    result = _done(_fitter, method, arguments)
     return result.lean() if isinstance(result, Explanation) else result
+
+
+def _done(fitter: Fitter, method: str | Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    return getattr(fitter, method)(*arguments) if isinstance(method, str) else method(fitter, *arguments)
