@@ -19,7 +19,7 @@ from host.diagnosis.pruning import leanest
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.sea_fits import WAVES, again_in_waves, with_regular_waves, with_sea
 from host.diagnosis.search import Search
-from host.diagnosis.seas import Explained, among_waves, explains_more, in_a_sea, in_plain_waves
+from host.diagnosis.seas import Explained, among_waves, evidence, explains_more, in_a_sea, in_plain_waves
 from host.diagnosis.spans import Spans, divide, excerpt
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.unknown_physics import known_in, unknown_in, with_unknown
@@ -131,7 +131,7 @@ def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], 
     values = dict(zip(extended.fit.structure.names, extended.fit.parameters.tolist(), strict=True))
     effects = [_with_coefficients(effect, values, std) for effect in judged.effects]
     errors = free_run_errors(base, longest)
-    told = remaining(judged.verdict, best, left, judged.after)
+    told = remaining(judged.verdict, best, left, judged.after, evidence(waves))
     return Diagnosis(
         verdict=judged.verdict,
         recordings=recordings,
@@ -165,7 +165,7 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
     effects.sort(key=lambda effect: -effect.delta_bic)
     # The very waves that were met are chance, and the regular one in their place may come out of step.
     without_it = after if waves is None else misfit(waves.fitted, spans, floor)
-    verdict = verdict_on(model, left, before, without_it)
+    verdict = verdict_on(model, left, before, without_it, evidence(waves))
     return Judged(before, after, effects, verdict, _slots(search, best, effects, verdict))
 
 

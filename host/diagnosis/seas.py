@@ -1,6 +1,7 @@
 """Searches under random forces: where the sea moves the vehicle, and where it does so with a wave's swing."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -45,6 +46,11 @@ class Explained(NamedTuple):
     search: Search
     left: Leftover
     waves: Waves | None
+
+
+def evidence(waves: Waves | None) -> float:
+    """What speaks for the waves: nothing that doubts them where there are none."""
+    return inf if waves is None else waves.delta_bic
 
 
 def in_a_sea(calm: Search, best: Explanation) -> tuple[Search, Explanation]:

@@ -3,8 +3,10 @@
 As catalogues can imitate, an explanation that leaves nothing is not yet a good one: several effects at once,
 none of which every vehicle has, are less likely than one that the catalogue lacks; and so are large offsets
 that cancel, of which only the curve of one (a weight along a pitched hull, c_w0 (cos theta - 1)) remains.
+What the hull does late or twice passes for a short sea, too, if for one that is hardly likelier than others.
 """
 
+from math import inf
 from typing import Literal
 
 from host.catalogue import BY_NAME, ORDINARY
@@ -17,17 +19,23 @@ from host.diagnosis.unknown_physics import known_in, unknown_in
 Verdict = Literal["no_mismatch", "explained", "partly_explained", "unexplained"]
 WORSE = 2.0  # chi2 of held-out spans from which on an explanation must at least better the base there
 MOST_RARE = 2  # effects at once that not every vehicle has
+FAINT_WAVES = 30.0  # of BIC over all else: what a late hull imitates reaches about half of that
 CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
 
 
-def verdict_on(best: Explanation, left: Leftover, before: Misfit, after: Misfit) -> Verdict:
-    """Of an explanation, by what it leaves and how far it betters the base on held-out spans."""
+def verdict_on(
+    best: Explanation, left: Leftover, before: Misfit, after: Misfit, waves: float = inf
+) -> Verdict:
+    """Of an explanation, by what it leaves and how far it betters the base on held-out spans.
+
+    waves  by how much of BIC those it was found among, if any, are likelier than no waves
+    """
     if left.is_nothing and not best.names:
         return "no_mismatch"
     # Random forces spoil a free run whatever is known: it need not be better for knowing more.
     worst = max(before.chi2 * (SEA_DOUBT if best.fit.has_process_noise else 1.0), WORSE)
     if left.is_nothing and after.chi2 < worst and not unknown_in(best):
-        return "partly_explained" if _doubt(best) else "explained"
+        return "partly_explained" if _doubt(best, waves) else "explained"
     return "partly_explained" if known_in(best) and after.chi2 < 0.7 * before.chi2 else "unexplained"
 
 
@@ -49,8 +57,10 @@ def cancelling_in(explanation: Explanation) -> list[str]:
     return offsets if is_cancelled else []
 
 
-def _doubt(explanation: Explanation) -> str:
+def _doubt(explanation: Explanation, waves: float) -> str:
     """Why a set that leaves nothing may yet be none that acts; empty where nothing speaks against it."""
+    if waves < FAINT_WAVES:
+        return "waves are hardly likelier than physics that the catalogue does not hold."
     names, are = rare_in(explanation), "seldom act at once"
     if len(names) <= MOST_RARE:
         names, are = cancelling_in(explanation), "cancel"
@@ -60,7 +70,7 @@ def _doubt(explanation: Explanation) -> str:
     return f"{listed} {are}: together they may imitate physics that the catalogue does not hold."
 
 
-def remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit) -> str:
+def remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit, waves: float = inf) -> str:
     """What the explanation leaves, in words."""
     sea = (
         " Random forces act as well (waves, current, turbulence); they are part of the noise model."
@@ -82,7 +92,7 @@ def remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit
         return "What is left is as small as the sensors' own noise."
     if forms and left.is_nothing:
         return f"Physics is at work that the catalogue does not hold.{forms}" + sea
-    if left.is_nothing and after.chi2 < WORSE and (doubt := _doubt(best)):
+    if left.is_nothing and (after.chi2 < WORSE or waves < inf) and (doubt := _doubt(best, waves)):
         return f"Nothing else is left, but {doubt}" + sea
     if left.is_smooth:
         kind = "it depends on the motion, so it is physics and no sea, but none that is known here"

@@ -88,3 +88,13 @@ def test_offsets_that_cancel_are_doubted_by_name(
     said = remaining(verdict, best, leftover(), misfit(1.0))
     assert ("net buoyancy, rudder offset, trim moment cancel:" in said) == (verdict == "partly_explained")
     assert not cancelling_in(replace(best, names=offsets - {"trim_moment"}))
+
+
+@pytest.mark.parametrize(("evidence", "verdict"), [(16.0, "partly_explained"), (200.0, "explained")])
+def test_waves_that_are_hardly_likelier_than_none_are_doubted(
+    base: Explanation, evidence: float, verdict: Verdict
+) -> None:
+    best = named(base, "surface_waves")
+    assert verdict_on(best, leftover(), misfit(5.0), misfit(1.0), evidence) == verdict
+    said = remaining(verdict, best, leftover(), misfit(4.0), evidence)
+    assert ("waves are hardly likelier" in said) == (verdict == "partly_explained")
