@@ -1,7 +1,14 @@
-"""Workers end with the command that they work for."""
+"""Workers do the same on one core as on several, and end with the command that they work for."""
 
 import subprocess
 import sys
+
+import pytest
+from hidden_dive import hidden_dive
+
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.sea_fits import with_sea
+from host.diagnosis.workers import Workers
 
 KILLED = """
 import multiprocessing, os, signal
@@ -13,6 +20,20 @@ if __name__ == "__main__":
     print("worker", pool.submit(len, "abc").result(), flush=True)
     os.kill(os.getpid(), signal.SIGKILL)
 """
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_methods_and_functions_of_a_fitter_are_called_in_order(jobs: int) -> None:
+    fitter = Fitter([hidden_dive(duration=40.0)])
+    ended: list[int] = []
+    with Workers(fitter, jobs) as workers:
+        tasks = [("reduced", (fitter.root, frozenset())), (with_sea, (fitter.base,))]
+        calm, rough = workers.results(tasks, ended.append)
+    assert not calm.names
+    assert not calm.fit.has_process_noise
+    assert rough.fit.has_process_noise
+    assert rough.bic == pytest.approx(with_sea(fitter, fitter.base).bic, abs=1e-6)
+    assert ended == [0, 1]
 
 
 def test_a_worker_leaves_when_its_parent_was_killed() -> None:

@@ -16,7 +16,7 @@ from host.maximum_likelihood import fit_maximum_likelihood
 from host.propagate import free_run, inputs_of
 from host.uncertainty import covariance
 from host.vehicle import default_vehicle
-from host.waves import SHAPE, in_waves_from, is_sea, whitened_in_waves
+from host.waves import SHAPE, in_waves, in_waves_from, is_sea, whitened_in_waves
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 
@@ -176,6 +176,20 @@ def test_one_wave_in_depth_and_pitch_leaves_speed_and_damping_alone(monkeypatch:
     two = in_waves_from(apart, [inputs_of(recording)], fit.free)
     assert two.waves[2] == 0.0
     assert two.log_likelihood < fit.log_likelihood - 20.0
+
+
+def test_weak_waves_are_found_where_white_forces_tell_nothing() -> None:
+    recording, _ = fly(Dive(duration=200.0))
+    rng = np.random.default_rng(5)
+    met, phase = rng.uniform(1.0, 1.5, 12), rng.uniform(0.0, 2.0 * np.pi, 12)
+    recording.pitch[:] += 3e-4 * np.sin(np.outer(recording.time, met) + phase).sum(axis=1)
+    calm = fit_maximum_likelihood([recording], noise_model="output_error")
+    none = replace(calm, noise=np.array([*calm.noise[:2], 1e-16, 1e-16]))
+    inputs = [inputs_of(recording)]
+    fit = in_waves(none, inputs)
+    assert is_sea(fit)
+    assert fit.waves[0] == pytest.approx(1.25, rel=0.15)
+    assert fit.log_likelihood > calm.log_likelihood + 40.0
 
 
 def test_wandering_is_told_and_kept_in_the_model() -> None:
