@@ -4,6 +4,7 @@ CasADi goes through a function's instructions one by one, which takes ten times 
 makes of them. It is the same operations in the same order, so the results have the same bits.
 """
 
+import ctypes
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -23,23 +24,29 @@ T = TypeVar("T")
 
 @cache
 def compiler() -> str | None:
-    """The computer's C compiler, if any."""
-    return next((found for name in ("cc", "gcc", "clang") if (found := shutil.which(name))), None)
+    """The computer's C compiler, if it has one that works and what it makes may be loaded."""
+    found = filter(None, map(shutil.which, ("cc", "gcc", "clang")))
+    return next((one for one in found if _made_by(one, "int works = 1;", ctypes.CDLL)), None)
 
 
 def compiled(source: str, load: Callable[[str], T], effort: str = "-O1") -> T | None:
-    """What `load` makes of a library compiled from C; None where there is no compiler, or it does not work.
+    """What `load` makes of a library compiled from C; None where there is no compiler, or it refuses.
 
     The library's file may go once it is loaded.
     """
-    if (found := compiler()) is None:
-        return None
+    found = compiler()
+    return None if found is None else _made_by(found, source, load, effort)
+
+
+def _made_by(compiler: str, source: str, load: Callable[[str], T], effort: str = "-O1") -> T | None:
     with TemporaryDirectory() as folder:
         text, library = Path(folder, "source.c"), Path(folder, "library.so")
         text.write_text(source, encoding="utf-8")
-        command = [found, effort, *FLAGS, "-o", str(library), str(text)]
+        command = [compiler, effort, *FLAGS, "-o", str(library), str(text)]
         try:
-            subprocess.run(command, check=True, capture_output=True, timeout=LONGEST)
+            subprocess.run(
+                command, check=True, stdin=subprocess.DEVNULL, capture_output=True, timeout=LONGEST
+            )
             return load(str(library))
         except (OSError, subprocess.SubprocessError, RuntimeError):
             return None

@@ -1,4 +1,5 @@
 import shutil
+from functools import partial
 from pathlib import Path
 
 import casadi as ca
@@ -69,6 +70,21 @@ def test_a_compiler_that_does_not_work_is_none(name: str, monkeypatch: pytest.Mo
     with_a_compiler(shutil.which(name) or str(Path("/") / name), monkeypatch)
     x = ca.SX.sym("x")
     assert as_machine_code(ca.Function("twice", [x], [2.0 * x])) is None
+
+
+@pytest.mark.parametrize(
+    ("names", "is_there"), [({}, False), ({"cc": "false"}, False), ({"clang": "cc"}, True)]
+)
+def test_a_compiler_counts_only_if_it_works(
+    names: dict[str, str], is_there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, program in names.items():
+        if (found := shutil.which(program)) is None:
+            pytest.skip(f"no {program} here")
+        (tmp_path / name).symlink_to(found)
+    expected = str(tmp_path / next(iter(names))) if is_there else None
+    monkeypatch.setattr(shutil, "which", partial(shutil.which, path=str(tmp_path)))
+    assert machine_code.compiler.__wrapped__() == expected
 
 
 @needs_compiler
