@@ -83,8 +83,10 @@ def _is_kin(search: "Search", name: str, member: str) -> bool:
         return False
     if _is_close_kin(name, member) or {name, member} <= {*PITCHING_INTO_DEPTH}:
         return True
-    pays = search.gain_alone(name) > NAMING_MARGIN
     slots = {named(name).slot, named(member).slot}
+    if member in OFFSETS and len(slots) == 1:
+        return True  # alone it was tried beside a free trim, which did all that it could do
+    pays = search.gain_alone(name) > NAMING_MARGIN
     return pays and (len(slots) == 1 or slots == {"actuator", "sensor"})
 
 
