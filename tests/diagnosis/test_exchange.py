@@ -64,3 +64,15 @@ def test_a_neutral_depth_stands_still_beside_a_free_trim(fitter: Fitter) -> None
     alone = fitter.retrimmed(with_trim, frozenset({"trim_moment"}))
     assert alone.fit.free[neutral]
     assert np.isclose(alone.fit.log_likelihood, with_trim.fit.log_likelihood, atol=3.0)
+
+
+def test_what_acts_on_pitch_is_tried_in_the_place_of_a_moment(fitter: Fitter) -> None:
+    """Beside a free trim it can gain nothing that a moment does, so that says nothing of it."""
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        moment = search.remember(fitter.polished(fitter.grown(fitter.base, "trim_moment", [])))
+        assert exchanged(search, moment) is moment
+        on_pitch = {e.name for e in fitter.candidates if e.slot == "pitch" and e.name != FREE_TRIM.name}
+        tried = {name for names in search.tried if len(names) == 1 for name in names}
+        assert on_pitch >= {"pitch_quadratic_damping", "large_angle_restoring", "trim_moment"}
+        assert on_pitch <= tried
