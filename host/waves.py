@@ -162,6 +162,18 @@ def is_sea(fit: Fit) -> bool:
     return bool(WAVE_PERIODS[0] < 2.0 * np.pi / frequency < WAVE_PERIODS[1] and damping < BROADEST)
 
 
+def mean_moment(fit: Fit) -> float:
+    """The most that waves turn a vehicle which swings with them on the mean, rad/s^2: |a2| r^2 / s.
+
+    With r the deviation of the water's turning. In waves of number k the water that sinks by z turns by
+    k s z, and where it is deeper it turns less by k: on the mean by k r z = r^2 / s, nose down in seas from
+    ahead and up in such from astern (second order, as the drift forces of Faltinsen, Sea Loads, ch. 5).
+    """
+    s, d, turn, *densities = fit.waves
+    rising, turning = np.array(densities) / (4.0 * d * s**3)
+    return float(abs(fit.parameters[A2]) * ((turn * s) ** 2 * rising + turning) / s)
+
+
 def whitened_in_waves(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:
     """Innovations over their deviation (2, N) and their sensitivities, waves in the point's noise (7,)."""
     model, wider = _among(point, inputs)

@@ -19,7 +19,15 @@ from host.diagnosis.pruning import leanest
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.sea_fits import WAVES, again_in_waves, with_regular_waves, with_sea
 from host.diagnosis.search import Search
-from host.diagnosis.seas import Explained, among_waves, evidence, explains_more, in_a_sea, in_plain_waves
+from host.diagnosis.seas import (
+    Explained,
+    Waves,
+    among_waves,
+    evidence,
+    explains_more,
+    in_a_sea,
+    in_plain_waves,
+)
 from host.diagnosis.spans import Spans, divide, excerpt
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.unknown_physics import known_in, unknown_in, with_unknown
@@ -146,7 +154,7 @@ def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], 
         location=locate(longest, errors, floor, values["u0"]),
         force=unknown_force(longest, {n: values[n] for n in NAMES}, floor, fitter.accelerations),
         ranking=_ranking(search),
-        remaining=" ".join([told, *_other_answers(found)]),
+        remaining=" ".join([told, *_of_the_waves(waves), *_other_answers(found)]),
         has_sea=best.fit.has_process_noise,
         bic=best.bic,
         std=std,
@@ -159,7 +167,8 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
     model = best if waves is None else waves.model
     on_progress("held-out check")
     before, after = misfit(search.base, spans, floor), misfit(model, spans, floor)
-    effects = _named(search, best, spans, floor, after)
+    theirs = frozenset() if waves is None else waves.theirs
+    effects = [one for one in _named(search, best, spans, floor, after) if one.name not in theirs]
     if waves is not None and WAVES not in best.names:
         effects.append(NamedEffect(name=WAVES, delta_bic=waves.delta_bic))
     effects.sort(key=lambda effect: -effect.delta_bic)
@@ -255,6 +264,16 @@ def _ranking(search: Search) -> list[tuple[str, float]]:
     """What each effect alone improves the information criterion by, best first."""
     alone = [(effect.name, search.gain_alone(effect.name)) for effect in search.fitter.candidates]
     return sorted((pair for pair in alone if pair[1] > -inf), key=lambda pair: -pair[1])
+
+
+def _of_the_waves(waves: Waves | None) -> list[str]:
+    """Of offsets in the model that are not named."""
+    if waves is None or not waves.theirs:
+        return []
+    listed = " and ".join(name.replace("_", " ") for name in sorted(waves.theirs))
+    return [
+        f"The model holds a {listed} no larger than what waves themselves do on the mean: it is not named."
+    ]
 
 
 def _other_answers(extended: Explanation) -> list[str]:

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from host.catalogue import BY_NAME
+from host.catalogue import BY_NAME, named
+from host.catalogue.kin import OFFSETS, as_trim
 from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import SWINGING_MOMENT
 from host.diagnosis.explanation import Explanation, Names
@@ -22,21 +23,25 @@ from host.diagnosis.sea_fits import (
     with_waves,
 )
 from host.diagnosis.search import Search
-from host.waves import is_sea
+from host.waves import is_sea, mean_moment
+
+MEAN_MOMENTS = 2.0  # of what it may be: four seas came to 1.0 to 1.3
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Waves:
     """Surface waves that were named by their swing.
 
     delta_bic  what white random forces in their place lose
     fitted     what was found beside them, their band and height estimated with it
     model      the same with the regular wave nearest to them, to be simulated
+    theirs     offsets in it that are no larger than what waves do on the mean: no physics of the vehicle's
     """
 
     delta_bic: float
     fitted: Explanation
     model: Explanation
+    theirs: Names = frozenset()
 
 
 class Explained(NamedTuple):
@@ -167,5 +172,15 @@ def _searched(known: Search, first: Explanation, least: float) -> tuple[Search, 
     fitted = first if found.names == first.names else _lean(search, with_waves(fitter, found))
     for name in sorted(found.names - fitted.names):
         found = search.without(found, name)
-    told = Waves(delta_bic=least - first.bic, fitted=fitted, model=with_regular_waves(fitter, fitted))
-    return search, found, told
+    model = with_regular_waves(fitter, fitted)
+    return search, found, Waves(least - first.bic, fitted, model, _of_the_waves(fitted))
+
+
+def _of_the_waves(fitted: Explanation) -> Names:
+    """The offsets whose moment the waves themselves may be."""
+    fit, moments = fitted.fit, {}
+    known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
+    for name in fitted.names & {*OFFSETS}:
+        _, moments[name] = as_trim(known, name) @ [known[each.name] for each in named(name).parameters]
+    most = MEAN_MOMENTS * mean_moment(fit)
+    return frozenset(name for name, moment in moments.items() if 0.0 < abs(moment) < most)

@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 from hidden_dive import Extra, hidden_dive
 
+from host.catalogue import structure_of
 from host.diagnosis.diagnose import diagnose
+from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
 from host.diagnosis.sea_fits import with_sea
 from host.diagnosis.search import Search
-from host.diagnosis.seas import among_waves, explains_more, in_plain_waves, plain_waves
+from host.diagnosis.seas import _of_the_waves, among_waves, explains_more, in_plain_waves, plain_waves
 from host.diagnosis.workers import Workers
 from host.recording import Array
+from host.waves import mean_moment
 
 
 def in_waves(extra: Extra, carried: float, turned: float) -> Extra:
@@ -91,3 +94,22 @@ def test_what_only_passes_for_waves_is_none(monkeypatch: pytest.MonkeyPatch) -> 
         assert doubtful is not None
         assert not doubtful.left.is_nothing  # something else is left among them
     assert plain_waves(Fitter([hidden_dive(duration=60.0)])) is None
+
+
+def test_a_moment_no_larger_than_the_waves_own_is_theirs() -> None:
+    base = Fitter([hidden_dive(duration=40.0)]).base
+    structure = structure_of(frozenset({"trim_moment"}))
+    s, d, z = 1.3, 0.1, 0.2  # of a wave in which the vehicle is carried up and down by z
+    number = s**2 / 9.80665
+    turning = (number * s * z) ** 2 / 2.0
+    waves = np.array([s, d, 0.0, 0.0, turning * 4.0 * d * s**3])
+    known = dict(zip(base.fit.structure.names, base.fit.parameters.tolist(), strict=True))
+    depth = z * np.cos(np.linspace(0.0, 2.0 * np.pi, 1000, endpoint=False))
+    on_the_mean = np.mean(number * s * depth * np.exp(-number * depth))
+    assert on_the_mean < 0.0
+    for moment, theirs in ((1.0, {"trim_moment"}), (3.0, set())):
+        known["c_q0"] = moment * known["a2"] * on_the_mean
+        values = np.array([known[name] for name in structure.names])
+        fit = replace(base.fit, structure=structure, parameters=values, waves=waves)
+        assert mean_moment(fit) == pytest.approx(abs(known["a2"] * on_the_mean), rel=0.01)
+        assert _of_the_waves(Explanation(frozenset({"trim_moment"}), fit, 0.0)) == theirs
