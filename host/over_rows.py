@@ -13,7 +13,7 @@ from host.recording import Array
 ROWS_AT_ONCE = 256
 KEPT = 64  # functions of each kind: a search meets hundreds of sets, and those of all would fill the memory
 # Instructions and rows after which a function is compiled: it has run for about as long as that takes.
-FEW_ROWS, FEW_INSTRUCTIONS = 4e4, 4e7
+FEW_ROWS, FEW_INSTRUCTIONS = 4e4, 8e7
 
 F = TypeVar("F")
 OverRows = Callable[[Array, Array, Array], Array]
