@@ -22,6 +22,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--pairs", type=int, default=3)
     parser.add_argument("--jobs", type=int, default=1, help="cores")
     told = parser.parse_args(arguments)
+    if told.pairs < 1:
+        parser.error("--pairs must be 1 or more")
     if compiler() is None:
         print("bench_compiler: no C compiler (cc, gcc, clang) on the PATH", file=sys.stderr)
         return 2

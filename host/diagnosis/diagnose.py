@@ -154,7 +154,7 @@ def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], 
         location=locate(longest, errors, floor, values["u0"]),
         force=unknown_force(longest, {n: values[n] for n in NAMES}, floor, fitter.accelerations),
         ranking=_ranking(search),
-        remaining=" ".join([told, *_of_the_waves(waves), *_other_answers(found)]),
+        remaining=" ".join([told, *_unnamed(waves), *_other_answers(found)]),
         has_sea=best.fit.has_process_noise,
         bic=best.bic,
         std=std,
@@ -266,7 +266,7 @@ def _ranking(search: Search) -> list[tuple[str, float]]:
     return sorted((pair for pair in alone if pair[1] > -inf), key=lambda pair: -pair[1])
 
 
-def _of_the_waves(waves: Waves | None) -> list[str]:
+def _unnamed(waves: Waves | None) -> list[str]:
     """Of offsets in the model that are not named."""
     if waves is None or not waves.theirs:
         return []

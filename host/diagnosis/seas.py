@@ -28,7 +28,7 @@ from host.waves import is_sea, mean_moment
 MEAN_MOMENTS = 2.0  # of what it may be: four seas came to 1.0 to 1.3
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Waves:
     """Surface waves that were named by their swing.
 
@@ -41,7 +41,7 @@ class Waves:
     delta_bic: float
     fitted: Explanation
     model: Explanation
-    theirs: Names = frozenset()
+    theirs: Names
 
 
 class Explained(NamedTuple):
@@ -173,7 +173,8 @@ def _searched(known: Search, first: Explanation, least: float) -> tuple[Search, 
     for name in sorted(found.names - fitted.names):
         found = search.without(found, name)
     model = with_regular_waves(fitter, fitted)
-    return search, found, Waves(least - first.bic, fitted, model, _of_the_waves(fitted))
+    theirs = _of_the_waves(fitted)
+    return search, found, Waves(delta_bic=least - first.bic, fitted=fitted, model=model, theirs=theirs)
 
 
 def _of_the_waves(fitted: Explanation) -> Names:

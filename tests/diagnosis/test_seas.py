@@ -7,13 +7,22 @@ import pytest
 from hidden_dive import Extra, hidden_dive
 
 from host.catalogue import structure_of
-from host.diagnosis.diagnose import diagnose
+from host.diagnosis.diagnose import _judge, _unnamed, diagnose
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
 from host.diagnosis.sea_fits import with_sea
 from host.diagnosis.search import Search
-from host.diagnosis.seas import _of_the_waves, among_waves, explains_more, in_plain_waves, plain_waves
+from host.diagnosis.seas import (
+    Explained,
+    Waves,
+    _of_the_waves,
+    among_waves,
+    explains_more,
+    in_plain_waves,
+    plain_waves,
+)
+from host.diagnosis.spans import divide
 from host.diagnosis.workers import Workers
 from host.recording import Array
 from host.waves import mean_moment
@@ -113,3 +122,26 @@ def test_a_moment_no_larger_than_the_waves_own_is_theirs() -> None:
         fit = replace(base.fit, structure=structure, parameters=values, waves=waves)
         assert mean_moment(fit) == pytest.approx(abs(known["a2"] * on_the_mean), rel=0.01)
         assert _of_the_waves(Explanation(frozenset({"trim_moment"}), fit, 0.0)) == theirs
+
+
+def test_an_offset_that_is_the_waves_own_stays_in_the_model_without_a_name() -> None:
+    rough = in_waves(lambda time, x, plane: (0.0, 0.3, 0.0), 0.01, 0.02)  # noqa: ARG005
+    spans = divide([hidden_dive(rough, duration=60.0)])
+    fitter = Fitter(spans.teaching)
+    waves = plain_waves(fitter)
+    assert waves is not None
+    best = fitter.retrimmed(waves, frozenset({"trim_moment"}))
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, waves)
+        for theirs, named in (
+            (frozenset[str](), {"trim_moment", "surface_waves"}),
+            (best.names, {"surface_waves"}),
+        ):
+            told = Waves(delta_bic=100.0, fitted=best, model=best, theirs=theirs)
+            judged = _judge(
+                Explained(best, search, leftover(fitter, best), told), spans, fitter.floor, lambda _: None
+            )
+            named = {effect.name for effect in judged.effects}
+            assert named == {"trim_moment", "surface_waves"} - theirs
+            assert ["trim moment" in said for said in _unnamed(told)] == [True] * len(theirs)
+    assert _unnamed(None) == []

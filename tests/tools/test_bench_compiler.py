@@ -37,6 +37,12 @@ def test_a_diagnosis_that_fails_ends_the_bench(tmp_path: Path, capfd: pytest.Cap
     assert "gone.csv" in capfd.readouterr().err
 
 
+def test_no_pair_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["dive.csv", "--pairs", "0"])
+    assert "--pairs must be 1 or more" in capsys.readouterr().err
+
+
 def test_without_a_compiler_there_is_nothing_to_compare(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
