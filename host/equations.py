@@ -55,11 +55,11 @@ class Chain:
     extra        states of effects by name
     speed        u, m/s, measured where `is_speed_known` is 1; `speed_ratio` u / u0, on which forces depend;
     surge        u', m/s^2, of the measured speed
-    command      rad, the plane as commanded, its mean over the sub-step; `earlier` the commands of the rows
-                 before, newest first; `change` rad, by which the command grows over the sub-step if it
-                 grows evenly: what has its mean and first moment
+    command      rad, the plane as commanded; `earlier` the commands of the rows before, newest first
     elapsed      s from the row to the sub-step, `substep` its length
-    plane        rad, the angle at which the plane acts
+    plane        rad, the angle at which the plane acts, its mean over the sub-step; `change` rad, by which it
+                 grows in it if it grows evenly: what has its mean and first moment; `path` what the last
+                 actuator led it from and to
     heave, pitch, climb   terms added to w' (m/s^2), q' (rad/s^2), zeta' (m/s)
     sensed_pitch, sensed_depth   what the sensors give
     """
@@ -82,6 +82,7 @@ class Chain:
     plane: ca.SX
     substep: ca.SX = field(default_factory=lambda: ca.SX(0))
     change: ca.SX = field(default_factory=lambda: ca.SX(0))
+    path: tuple[ca.SX, ca.SX] | None = None
     heave: ca.SX = field(default_factory=lambda: ca.SX(0))
     pitch: ca.SX = field(default_factory=lambda: ca.SX(0))
     climb: ca.SX = field(default_factory=lambda: ca.SX(0))
@@ -98,7 +99,9 @@ class Effect:
     """Physics that the base model leaves out: one entry of the catalogue.
 
     force     adds to heave, pitch, climb or the rate of its own state; evaluated within each sub-step
-    command   changes the command before the actuator, once a sub-step
+    late      which command has arrived when a sub-step begins, which when it ends, and the share of it for
+              which the first is in force
+    command   changes the command before the actuator
     actuator  (chain, held angle, sub-step s) -> (mean angle over the sub-step, next held angle), and sets the
               chain's change; needs a state of its own, which starts at the command
     plane     changes the angle at which the plane acts
@@ -124,6 +127,7 @@ class Effect:
     scales: tuple[str, ...] = ()
     periods: tuple[float, float] | None = None
     force: Term | None = None
+    late: Callable[[Chain], tuple[ca.SX, ca.SX, ca.SX]] | None = None
     command: Term | None = None
     actuator: Callable[[Chain, ca.SX, ca.SX], tuple[ca.SX, ca.SX]] | None = None
     plane: Term | None = None
@@ -234,16 +238,36 @@ class Structure:
         )
 
     def actuate(self, chain: Chain, substep: ca.SX) -> dict[str, ca.SX]:
-        """Sets the chain's plane angle for one sub-step; gives the next states of the actuators."""
-        moved = {}
+        """Sets the chain's plane angle for one sub-step; gives the next states of the actuators.
+
+        One part after the other where a late command gives way to the next within it.
+        """
         chain.substep = substep
+        held = {e.state: chain.extra[e.state] for e in self.effects if e.actuator is not None and e.state}
+        late = next((effect.late for effect in self.effects if effect.late is not None), None)
+        if late is None:
+            return self._led(chain, held, substep)
+        chain.command, latest, share = late(chain)
+        held = self._led(chain, held, share * substep)
+        before, grown, rest = chain.plane, chain.change, 1 - share
+        chain.command = latest
+        held = self._led(chain, held, rest * substep)
+        stepped = 6 * share * rest * (chain.plane - before)
+        chain.change = stepped + share**2 * grown + rest**2 * chain.change
+        chain.plane = share * before + rest * chain.plane
+        return held
+
+    def _led(self, chain: Chain, held: dict[str, ca.SX], span: ca.SX) -> dict[str, ca.SX]:
+        """The plane led through the actuators for a span, s, in which the command is constant."""
+        moved = {}
         for effect in self.effects:
             if effect.command is not None:
                 effect.command(chain)
-        chain.plane = chain.command
+        chain.plane, chain.change, chain.path = chain.command, ca.SX(0), None
         for effect in self.effects:
             if effect.actuator is not None and effect.state is not None:
-                chain.plane, moved[effect.state] = effect.actuator(chain, chain.extra[effect.state], substep)
+                chain.plane, end = effect.actuator(chain, held[effect.state], span)
+                moved[effect.state], chain.path = end, (held[effect.state], end)
         for effect in self.effects:
             if effect.plane is not None:
                 effect.plane(chain)

@@ -5,27 +5,35 @@ import casadi as ca
 from host.catalogue.switching import after, limited
 from host.equations import Chain, Effect, Parameter
 
+SLIGHT = 1e-12  # share of a sub-step, so that no part of it is empty
+LEAST_MOVED = 1e-9  # rad, of a servo that moves
+
 
 def _offset(c: Chain) -> None:
     c.plane = c.plane + c.p["rudder_zero"]
 
 
-def _delay(c: Chain) -> None:
-    """Within the sub-step a late command may give way to the next: its mean and first moment are kept."""
-    mean, change, ends = ca.SX(0), ca.SX(0), ca.SX(1)
-    for lag, command in enumerate((c.command, *c.earlier)):
-        if "plane_before" in c.p:
-            is_before = c.time - c.elapsed - (lag - 0.5) * c.interval < 0
-            command = ca.if_else(is_before, c.p["plane_before"], command)
-        begins = ca.fmax(0, ca.fmin(1, (c.p["delay"] - lag * c.interval - c.elapsed) / c.substep))
-        mean += command * (ends - begins)
-        change += command * 6 * (ends * (ends - 1) - begins * (begins - 1))
-        ends = begins
-    c.command, c.change = mean, change
+def _delay(c: Chain) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Commands come no closer than sub-steps are long: at most one gives way to the next in each."""
+    commands = [c.command, *c.earlier]
+    if "plane_before" in c.p:
+        ages = [c.elapsed + (lag - 0.5) * c.interval for lag in range(len(commands))]
+        commands = [
+            ca.if_else(c.time < age, c.p["plane_before"], command)
+            for age, command in zip(ages, commands, strict=True)
+        ]
+    first = latest = commands[-1]
+    share = ca.SX(0)
+    for lag in reversed(range(len(commands) - 1)):
+        begins = (c.p["delay"] - lag * c.interval - c.elapsed) / c.substep
+        has_come = begins < 1
+        first = ca.if_else(has_come, commands[lag + 1], first)
+        latest = ca.if_else(has_come, commands[lag], latest)
+        share = ca.if_else(has_come, begins, share)
+    return first, latest, ca.fmax(SLIGHT, ca.fmin(1 - SLIGHT, share))
 
 
 def _saturation(c: Chain) -> None:
-    c.change = ca.if_else(ca.fabs(c.command) < c.p["plane_limit"], c.change, 0)
     c.command = limited(c.command, c.p["plane_limit"])
 
 
@@ -43,12 +51,11 @@ def _lag(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:
     """The mean over the sub-step, and the end: at the largest rate first where that is limited."""
     if "plane_rate" in c.p:
         return _hurried_lag(c, held, substep)
-    time, slope = c.p["lag_time"], c.change / substep
+    time, away = c.p["lag_time"], held - c.plane
     left = ca.exp(-substep / time)
-    away = held - (c.plane - c.change / 2 - slope * time)  # from the ramp that the plane ends up on
-    end = c.plane + c.change / 2 - slope * time + away * left
+    end = c.plane + away * left
     moment = time**2 * (1 - left) - substep * time * (1 + left) / 2
-    c.change += 12 * away * moment / substep**2
+    c.change = 12 * away * moment / substep**2
     return c.plane - time * (end - held) / substep, end
 
 
@@ -64,10 +71,23 @@ def _hurried_lag(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def _backlash(c: Chain, held: ca.SX, substep: ca.SX) -> tuple[ca.SX, ca.SX]:  # noqa: ARG001
+    """Stays behind until the servo has crossed the play; goes along for the last share of a sub-step."""
     half = c.p["backlash"] / 2
-    moved = ca.fmax(c.plane - half, ca.fmin(c.plane + half, held))
-    c.change = ca.SX(0)
-    return moved, moved
+    if c.path is None:
+        c.change = ca.SX(0)
+        moved = _kept_within(held, c.plane, half)
+        return moved, moved
+    begin, end = c.path
+    first = _kept_within(held, begin, half)
+    last = _kept_within(first, end, half)
+    share = ca.fmin(1, ca.fabs(last - first) / ca.fmax(ca.fabs(end - begin), LEAST_MOVED))
+    bent = c.plane - (begin + end) / 2  # the mean of a servo that does not move evenly
+    c.change = (last - first) * share * (3 - 2 * share) + (c.change - (end - begin)) * share**2
+    return first + (last - first) * share / 2 + bent * share**2, last
+
+
+def _kept_within(plane: ca.SX, servo: ca.SX, half: ca.SX) -> ca.SX:
+    return ca.fmax(servo - half, ca.fmin(servo + half, plane))
 
 
 def _stall(c: Chain) -> None:
@@ -106,7 +126,7 @@ EFFECTS = (
         equation="delta(t) = command(t - delay)",
         manoeuvre="plane steps at a higher sampling rate",
         probes=((0.04,), (0.13,), (0.28,), (0.56,)),
-        command=_delay,
+        late=_delay,
         lags=True,
     ),
     Effect(

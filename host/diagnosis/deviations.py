@@ -1,9 +1,11 @@
-"""How well the coefficients of an explanation are known, its moments by their profile.
+"""How well the coefficients of an explanation are known, by profiles of the likelihood.
 
-The likelihood of a moment at which something changed is no parabola: while the plane rests it is level, and
-where the plane moves there is a cliff. So a moment's deviation is told by how far it can be moved to either
-side, all else following one Gauss-Newton step ahead, until twice the log-likelihood has fallen by 1.96^2;
-correlated residuals repeat each other's evidence.
+Heave damping and speed, and coefficients along other curved valleys, may lie much further to one side than
+the curvature at the maximum says. So each is moved there, the others following to where they are likeliest
+beside it, until twice the log-likelihood has fallen by 1.96^2, and its deviation is told by the side on which
+it gets further (Pawitan, In All Likelihood, 2001, ch. 3.4). The likelihood of a moment at which something
+changed is no parabola at all: while the plane rests it is level, and where the plane moves there is a cliff.
+There the others follow one Gauss-Newton step ahead. Correlated residuals repeat each other's evidence.
 """
 
 import numpy as np
@@ -13,11 +15,17 @@ from host.diagnosis.fitter import Fitter
 from host.diagnosis.prospects import whitened_at
 from host.equations import Effect
 from host.gauss_newton import GaussNewton, Point
+from host.output_error import output_error
+from host.recording import Array
+from host.straightened import stepped
 from host.uncertainty import covariance
 from host.whiteness import correlation_factor
 
 HALF_WIDTH = 1.96  # deviations, of an interval that holds the truth 95 times in 100
 BISECTIONS = 5
+MOST_STRIDES, LONGEST_STRIDE = 6, 2.0  # of a profile; times what the last one came to
+NEARLY_FALLEN = 0.95  # of what the log-likelihood is to fall by
+FEW_ITERATIONS, TOLERANCE = 10, 0.005
 
 
 def deviations(fitter: Fitter, explanation: Explanation) -> dict[str, float]:
@@ -34,6 +42,8 @@ def deviations(fitter: Fitter, explanation: Explanation) -> dict[str, float]:
     least = fitter.recordings[0].step / np.sqrt(12.0)
     most = max(recording.duration for recording in fitter.recordings) / np.sqrt(12.0)
     free = {name for name, is_free in zip(structure.names, explanation.fit.free, strict=True) if is_free}
+    if not explanation.fit.has_process_noise:
+        std |= _profiled(fitter, explanation, {name: std[name] for name in free - structure.moments})
     for name in structure.moments & free:
         reach = max(_reach(fitter, explanation, name, side) for side in (-1.0, 1.0))
         std[name] = float(np.clip(reach / HALF_WIDTH, least, most))
@@ -45,6 +55,54 @@ def interval(effect: Effect, name: str, value: float, std: float) -> tuple[float
     bounds = next((p.lower, p.upper) for p in effect.parameters if p.name == name)
     low, high = np.clip([value - HALF_WIDTH * std, value + HALF_WIDTH * std], *bounds)
     return float(low), float(high)
+
+
+def _profiled(fitter: Fitter, explanation: Explanation, std: dict[str, float]) -> dict[str, float]:
+    """The deviations, or larger ones where a profile of the likelihood is flatter than its curvature says."""
+    fit, found = explanation.fit, {}
+    free = np.flatnonzero(fit.free)
+    white = np.zeros((fit.free.size, fit.free.size))
+    white[np.ix_(free, free)] = np.linalg.pinv(fit.information[np.ix_(free, free)], hermitian=True)
+    for name, known in std.items():
+        k = fit.structure.names.index(name)
+        found[name] = known
+        if known > 0.0 and white[k, k] > 0.0:
+            ahead = white[:, k] / white[k, k]
+            limit = (HALF_WIDTH * known) ** 2 / white[k, k]
+            sides = (_distance(fitter, explanation, k, side * ahead, known, limit) for side in (-1.0, 1.0))
+            found[name] = max(known, *(distance / HALF_WIDTH for distance in sides))
+    return found
+
+
+def _distance(
+    fitter: Fitter, explanation: Explanation, k: int, ahead: Array, std: float, limit: float
+) -> float:
+    """How far coefficient k can be moved until twice the log-likelihood has fallen by the limit.
+
+    ahead  (n,) by how much all coefficients move with it at first, its own by 1 or -1
+    """
+    fit, inputs = explanation.fit, fitter.inputs(explanation.names)
+    point = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+    others = fit.free & (np.arange(fit.free.size) != k)
+    near, fallen_near, far = 0.0, 0.0, HALF_WIDTH * std
+    for _ in range(MOST_STRIDES):
+        moved = stepped(fit.structure.names, point.parameters, ahead * (far - near))
+        moved[k] = fit.parameters[k] + ahead[k] * far
+        clipped = fit.structure.clipped(moved)
+        if clipped[k] != moved[k]:
+            return abs(float(clipped[k] - fit.parameters[k]))  # its bound
+        start = Point(fit.structure, clipped, point.initial, point.noise)
+        beside = output_error(start, inputs, others, FEW_ITERATIONS, TOLERANCE)
+        fallen = max(2.0 * (fit.log_likelihood - beside.log_likelihood), 0.0)
+        if fallen > limit:
+            share = (limit**0.5 - fallen_near**0.5) / (fallen**0.5 - fallen_near**0.5)
+            return float(near + (far - near) * share)
+        if fallen > NEARLY_FALLEN * limit:
+            return far
+        point = Point(fit.structure, beside.parameters, beside.initial, beside.noise)
+        near, fallen_near = far, fallen
+        far *= min(LONGEST_STRIDE, (limit / max(fallen, 1e-9)) ** 0.5)
+    return near
 
 
 def _reach(fitter: Fitter, explanation: Explanation, name: str, side: float) -> float:

@@ -1,6 +1,7 @@
 """Every entry of the catalogue: complete, differentiable, and acting."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -228,10 +229,22 @@ def test_a_servo_lag_is_exact_behind_a_delay_however_coarse_the_rows(lag: float,
     assert (np.abs(off).max(axis=1) < 2e-3 * rate).all()
 
 
-@pytest.mark.parametrize("names", [("actuator_rate_limit",), ("actuator_rate_limit", "actuator_lag")])
-def test_a_rate_limit_is_exact_however_coarse_the_rows(names: tuple[str, ...]) -> None:
+DRIVE = {
+    "actuator_delay": {"delay": 0.23},
+    "actuator_saturation": {"plane_limit": 0.15},
+    "actuator_rate_limit": {"plane_rate": 0.15},
+    "actuator_lag": {"lag_time": 0.4},
+    "actuator_backlash": {"backlash": 0.06},
+}
+
+
+@pytest.mark.parametrize("names", [*((name,) for name in DRIVE), *combinations(DRIVE, 2), tuple(DRIVE)])
+def test_the_drive_of_the_plane_is_exact_however_coarse_the_rows(names: tuple[str, ...]) -> None:
     rows, structure = hidden_dive(duration=30.0), structure_of(names)
-    values = np.array([*BASE.values(), 0.0, 0.0, 1.1, 0.08])[: len(structure.names)]
+    known = BASE | {"heave_offset": 0.0, "pitch_offset": 0.0}
+    for name in names:
+        known |= DRIVE[name]
+    values = np.array([known[name] for name in structure.names])
     run = free_run(values, START, inputs_of(rows, structure, 0.1)).outputs
     true = free_run(values, START, inputs_of(finer(rows), structure)).outputs[:, ::EACH]
     assert np.abs(run - true).max() < 1e-3 * np.ptp(true, axis=1).min()
