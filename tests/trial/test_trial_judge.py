@@ -126,6 +126,16 @@ def test_coefficients_and_their_intervals() -> None:
     assert [c.name for c in given.base_coefficients] == ["a1"]
 
 
+def test_buoyancy_beyond_the_weight_restores_as_well() -> None:
+    light = answer(
+        hidden=("net_buoyancy",), base={"a3": -1.0}, sizes={"net_buoyancy": 0.981},
+        outing={"has_speed": False, "mass_kg": 1.0},
+    )  # fmt: skip
+    model = {"parameters": {"a3": {"value": -1.1, "std": 0.01}}}
+    found = judge(light, recorded(), diagnosis(effect("net_buoyancy"), slot="heave"), model)
+    assert [c.truth for c in found.base_coefficients] == [pytest.approx(-1.1, rel=1e-3)]
+
+
 def test_coefficients_count_only_where_the_whole_truth_was_named_and_have_a_deviation() -> None:
     two = answer("two", ("trim_moment", "net_buoyancy"))
     assert not judged(two, effect("trim_moment", c_q0=(0.021, 0.001))).effect_coefficients

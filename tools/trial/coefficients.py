@@ -54,6 +54,11 @@ def true_coefficients(effect: Hidden, setting: Setting, sea_phase: tuple[float, 
     return {} if same is None else {same: size}
 
 
+def lifted(base: dict[str, float], net_buoyancy: float, mass_kg: float) -> dict[str, float]:
+    """The base coefficients beside a net buoyancy, N: it restores as well, as the plant's moment is zb B."""
+    return base | {"a3": base["a3"] * (1.0 + net_buoyancy / (mass_kg * GRAVITY))}
+
+
 _SAME_UNIT = {
     "large_angle_restoring": "restoring_share",
     "large_angle_kinematics": "kinematics_share",

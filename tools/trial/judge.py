@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tools.trial.answers import Answer
+from tools.trial.coefficients import lifted
 
 LARGEST_CLASS = 3
 NOTHING = "nothing"
@@ -207,8 +208,11 @@ def _base_coefficients(answer: Answer, model: dict[str, Any] | None) -> list[Coe
     # With a varying speed these vary too, and which speed they belong to is a matter of words.
     if model is None or "speed_loss" in (*answer.hidden, *answer.usual):
         return []
+    base = answer.base
+    if "net_buoyancy" in answer.sizes:
+        base = lifted(base, answer.sizes["net_buoyancy"], float(answer.outing["mass_kg"]))
     found = []
-    for name, truth in answer.base.items():
+    for name, truth in base.items():
         if name != "u0" or not answer.outing["has_speed"]:
             found += _coefficient(answer, name, truth, model["parameters"].get(name))
     return found
