@@ -46,6 +46,7 @@ def heldout_errors(path: Path, names: tuple[str, ...], start: dict[str, float]) 
     from host.diagnosis.fitter import Fitter
     from host.diagnosis.scoring import misfit
     from host.diagnosis.spans import divide
+    from host.diagnosis.trims import retrimmed
     from host.gauss_newton import Point
     from host.noise_floor import noise_floor
     from host.output_error import output_error
@@ -60,7 +61,7 @@ def heldout_errors(path: Path, names: tuple[str, ...], start: dict[str, float]) 
         grown = fitter.root
         for name in order:
             grown = fitter.grown(grown, name, [])
-        candidates.append(fitter.polished(fitter.retrimmed(fitter.polished(grown), offsets)))
+        candidates.append(fitter.polished(retrimmed(fitter, fitter.polished(grown), offsets)))
     best = min(candidates, key=lambda e: e.bic)
     fit = best.fit
     values = [start.get(name, value) for name, value in zip(fit.structure.names, fit.parameters, strict=True)]

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING
 from host.catalogue import BY_NAME, ORDINARY, named
 from host.catalogue.kin import OFFSETS, PITCHING_INTO_DEPTH, both_come, measure_alike
 from host.diagnosis.explanation import Explanation, Names
+from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import FEW, LARGEST_SET, NAMING_MARGIN, SMALL, TWIN_MARGIN, margin
 from host.diagnosis.pruning import pruned
+from host.diagnosis.trims import retrimmed
 from host.diagnosis.workers import Task
 from host.whiteness import correlation_factor
 
@@ -36,12 +38,12 @@ def exchanged(search: "Search", best: Explanation) -> Explanation:
         rivals |= kin if is_small else {name for name in kin if _is_close_kin(name, member)}
         for name in sorted(rivals - best.names):
             beside = best if name in kin else None
-            fits = ("grown", (smaller, name, search.values(name), beside))
+            fits = (Fitter.grown, (smaller, name, search.values(name), beside))
             tasks.setdefault(smaller.names | {name}, fits)
         if member in OFFSETS and not is_large:
             kept = smaller.names & {*OFFSETS}
             for name in {*OFFSETS} - best.names:
-                tasks[smaller.names | {name}] = ("retrimmed", (best, kept | {name}))
+                tasks[smaller.names | {name}] = (retrimmed, (best, kept | {name}))
     tasks = {names: task for names, task in tasks.items() if names not in search.rivals}
     search.rivals.update(tasks)
     grown = [search.remember(e) for e in search.workers.results(list(tasks.values()))]
@@ -51,7 +53,7 @@ def exchanged(search: "Search", best: Explanation) -> Explanation:
     first = sorted(grown, key=lambda e: e.bic)
     least = POLISHED if is_small else 1
     close = [e for k, e in enumerate(first) if k < least or e.bic < best.bic + 4.0 * TWIN_MARGIN]
-    close = [search.remember(e) for e in search.workers.results([("polished", (e,)) for e in close])]
+    close = [search.remember(e) for e in search.workers.results([(Fitter.polished, (e,)) for e in close])]
     # Two members may stand for what one does that was not there: with it they are no longer needed.
     close = [e for e in close if e.bic < best.bic + margin(best)]
     leaner = (pruned(search, e) if 1 < len(e.names) <= SMALL else e for e in close)

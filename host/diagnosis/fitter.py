@@ -13,10 +13,9 @@ from host.diagnosis.absence import one_step_without
 from host.diagnosis.charges import charged_bic
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations
-from host.diagnosis.prospects import form_gains, gain
 from host.diagnosis.spans import ALARM_LATE
 from host.diagnosis.starts import guess, idle, is_far, scanned, starts_again, starts_of
-from host.diagnosis.trims import HELD, retrimmed, trimmed
+from host.diagnosis.trims import HELD, trimmed
 from host.equations import NAMES, Effect
 from host.filter_error import filter_error_from
 from host.fit import Fit
@@ -97,11 +96,8 @@ class Fitter:
 
     @cached_property
     def root(self) -> Explanation:
-        """The base with a free constant force and moment; see host.diagnosis.trims, as for `retrimmed`."""
+        """The base with a free constant force and moment; see host.diagnosis.trims."""
         return trimmed(self)
-
-    def retrimmed(self, explanation: Explanation, offsets: Names) -> Explanation:
-        return retrimmed(self, explanation, offsets)
 
     def excess(self, fit: Fit) -> float:
         """Sensor noise of a fit over the noise floor, in the worse channel: 1 where nothing is left."""
@@ -129,13 +125,6 @@ class Fitter:
         if named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
             fit = self.fitted([idle(starts[0], name)])
         return self.explained(parent.names | {name}, fit)
-
-    def gain(self, parent: Explanation, name: str, values: list[Array], is_thorough: bool) -> float:
-        """See host.diagnosis.prospects, as for `form_gains`: here for the workers to call."""
-        return gain(self, parent, name, values, is_thorough)
-
-    def form_gains(self, parent: Explanation) -> dict[str, float]:
-        return form_gains(self, parent)
 
     def shrunk(self, parent: Explanation, *members: str) -> Explanation:
         """The parent's set without some of its effects; not polished."""

@@ -10,6 +10,7 @@ from scipy.stats import chi2
 from host.catalogue.unknown import ANY_SMOOTH_FORCE
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.prospects import gain
 from host.equations import NAMES
 from host.fit import Fit
 from host.noise_floor import is_quantised
@@ -64,15 +65,17 @@ def leftover(fitter: Fitter, best: Explanation) -> Leftover:
     even = [e[~rounded] for e in fit.whitened]
     by_intervals = (fitter.steps > 0.0) & (not fit.has_process_noise)
     innovations = [e[~rounded | by_intervals] for e in fit.whitened]
-    gain = fitter.gain(best, ANY_SMOOTH_FORCE.name, [], is_thorough=True) / correlation_factor(fit.whitened)
-    terms, slack = len(ANY_SMOOTH_FORCE.parameters), WAVE_COLOUR if fit.waves.any() else 0.0
+    ahead = gain(fitter, best, ANY_SMOOTH_FORCE.name, [], is_thorough=True)
+    smooth_gain = ahead / correlation_factor(fit.whitened)
+    by_chance = chi2.isf(SIGNIFICANCE, len(ANY_SMOOTH_FORCE.parameters))
+    slack, doubt = WAVE_COLOUR if fit.waves.any() else 0.0, SEA_DOUBT if fit.has_process_noise else 1.0
     return Leftover(
         is_coloured=not all(is_white(e, 20, SIGNIFICANCE, slack) and is_even(e) for e in innovations),
         is_local=_is_local(fitter.recordings, even),
         is_no_sea=fit.has_process_noise and not fit.waves.any() and _heave_by_sea(fit) < LEAST_SEA,
         is_above_floor=is_above_floor(fitter, fit),
-        smooth_gain=gain,
-        is_smooth=bool(gain > chi2.isf(SIGNIFICANCE, terms) * (SEA_DOUBT if fit.has_process_noise else 1.0)),
+        smooth_gain=smooth_gain,
+        is_smooth=bool(smooth_gain > by_chance * doubt),
     )
 
 

@@ -7,6 +7,7 @@ from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, ROUGH, margin
+from host.diagnosis.trims import retrimmed
 
 if TYPE_CHECKING:
     from host.diagnosis.search import Search
@@ -15,7 +16,7 @@ LEADING = 8  # sets with a free trim that are looked at
 CONTENDERS = 3  # of them, for the first place
 
 
-def retrimmed(search: "Search") -> Explanation:
+def with_best_offsets(search: "Search") -> Explanation:
     """The leading sets with the free trim explained by as few of the offsets as will do."""
     free = [e for e in search.tried.values() if FREE_TRIM.name in e.names]
     free = sorted((e for e in free if not _has_idle_member(search, e)), key=lambda e: e.bic)
@@ -32,7 +33,7 @@ def retrimmed(search: "Search") -> Explanation:
     explained = [e for e in search.tried.values() if FREE_TRIM.name not in e.names]
     for counts in ((0, 1), (2,)):
         ways = [frozenset(way) for count in counts for way in combinations(OFFSETS, count)]
-        tasks = [("retrimmed", (e, way)) for e in polished for way in ways]
+        tasks = [(retrimmed, (e, way)) for e in polished for way in ways]
         found = [search.remember(e) for e in search.workers.results(tasks)]
         explained += search.polished_near(found, min(e.bic for e in [*explained, *found]))
         best = min(explained, key=lambda e: e.bic)
@@ -46,7 +47,7 @@ def with_offset(search: "Search", beam: list[Explanation]) -> list[Explanation]:
 
     At a speed that changes no constant force does what a bias of the pitch sensor or a current does.
     """
-    tasks = [("retrimmed", (e, frozenset({name}))) for e in beam for name in OFFSETS]
+    tasks = [(retrimmed, (e, frozenset({name}))) for e in beam for name in OFFSETS]
     best = min((search.remember(e) for e in search.workers.results(tasks)), key=lambda e: e.bic)
     return [best, *beam] if best.bic < beam[0].bic - margin(beam[0]) else beam
 

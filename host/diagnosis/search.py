@@ -20,7 +20,8 @@ from host.diagnosis.exchange import exchanged
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import FEW, LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN, ROUGH, SMALL, margin
-from host.diagnosis.offset_choice import retrimmed, with_offset
+from host.diagnosis.offset_choice import with_best_offsets, with_offset
+from host.diagnosis.prospects import gain
 from host.diagnosis.pruning import pruned
 from host.diagnosis.together import completed, together
 from host.diagnosis.workers import Task, Workers
@@ -84,7 +85,7 @@ class Search:
             if not beam or beam[0].bic > best_before - margin(beam[0]):
                 break
         self.on_progress("settling")
-        return completed(self, self._settled(retrimmed(self)))
+        return completed(self, self._settled(with_best_offsets(self)))
 
     def singles(self) -> list[Explanation]:
         """Each effect alone on top of the root."""
@@ -108,7 +109,7 @@ class Search:
 
     def without_all(self, best: Explanation, members: list[str]) -> Explanation:
         """The set less all of these members at once, fitted to the end."""
-        (found,) = self.workers.results([("shrunk", (best, *members))])
+        (found,) = self.workers.results([(Fitter.shrunk, (best, *members))])
         self.polish([self.remember(found).names])
         return self.tried[found.names]
 
@@ -132,13 +133,13 @@ class Search:
         """Twice the log-likelihood each effect could gain on top of the parent, predicted."""
         others = [name for name in self._candidates(parent) if among is None or name in among]
         found = self.workers.results(
-            [("gain", (parent, name, self.values(name), is_thorough)) for name in others]
+            [(gain, (parent, name, self.values(name), is_thorough)) for name in others]
         )
         return dict(zip(others, found, strict=True))
 
     def growth(self, parent: Explanation, name: str) -> Task:
         """The fit of a set with one effect, or form of unknown physics, more."""
-        return "grown", (parent, name, self.values(name))
+        return Fitter.grown, (parent, name, self.values(name))
 
     def shrink(self, explanation: Explanation, smaller: Iterable[Names]) -> None:
         """Fits sets of one member less roughly, once; again from a larger set that foretells more."""
@@ -146,7 +147,7 @@ class Search:
             names for names in smaller if names not in self._shrunk or self._falls_behind(names, explanation)
         ]
         members = [next(iter(explanation.names - names)) for names in new]
-        for found in self.workers.results([("shrunk", (explanation, member)) for member in members]):
+        for found in self.workers.results([(Fitter.shrunk, (explanation, member)) for member in members]):
             self.remember(found)
         for names in new:
             self._shrunk.setdefault(names, set()).add(explanation.names)
@@ -162,13 +163,13 @@ class Search:
     def polish(self, sets: Iterable[Names]) -> None:
         """Fits sets to the end, once."""
         new = [names for names in sets if names not in self._polished]
-        for found in self.workers.results([("polished", (self.tried[names],)) for names in new]):
+        for found in self.workers.results([(Fitter.polished, (self.tried[names],)) for names in new]):
             self.remember(found)
         self._polished.update(new)
 
     def polished_near(self, rough: list[Explanation], bic: float) -> list[Explanation]:
         """Those of them that may come near this BIC, fitted to the end."""
-        tasks: list[Task] = [("polished", (e,)) for e in rough if e.bic < bic + ROUGH]
+        tasks: list[Task] = [(Fitter.polished, (e,)) for e in rough if e.bic < bic + ROUGH]
         return [self.remember(e) for e in self.workers.results(tasks)]
 
     def remember(self, explanation: Explanation) -> Explanation:
@@ -180,7 +181,7 @@ class Search:
 
     def across(self, explanations: list[Explanation]) -> list[Explanation]:
         """Each in its likeliest valley."""
-        return [self.remember(e) for e in self.workers.results([("across", (e,)) for e in explanations])]
+        return [self.remember(e) for e in self.workers.results([(Fitter.across, (e,)) for e in explanations])]
 
     def _needs_many(self, leading: Explanation, size: int) -> bool:
         """Whether it is time, once, to try all that every vehicle has: far too much is left, or too much."""

@@ -15,6 +15,7 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.leftover import is_above_floor
 from host.diagnosis.margins import FEW, LITTLE, MUCH, SMALL, margin
 from host.diagnosis.pruning import pruned
+from host.diagnosis.trims import retrimmed
 from host.diagnosis.workers import Task
 
 if TYPE_CHECKING:
@@ -89,5 +90,5 @@ def _more(search: "Search", best: Explanation) -> list[Task]:
     promising = sorted(gains, key=lambda name: -gains[name])[:FEW]
     tasks = [search.growth(best, name) for name in promising]
     if FREE_TRIM.name in best.names:
-        tasks += [("retrimmed", (best, frozenset({name}))) for name in OFFSETS]
+        tasks += [(retrimmed, (best, frozenset({name}))) for name in OFFSETS]
     return tasks

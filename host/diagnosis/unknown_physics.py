@@ -10,6 +10,7 @@ from host.catalogue import BY_NAME, UNKNOWN
 from host.diagnosis.exchange import exchanged
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.margins import FEW, LARGEST_SET, LITTLE, NAMING_MARGIN, SMALL, margin
+from host.diagnosis.prospects import form_gains
 from host.diagnosis.pruning import pruned
 from host.diagnosis.search import Search
 from host.diagnosis.together import completed
@@ -83,7 +84,7 @@ def _grown(search: Search, best: Explanation) -> list[Explanation]:
     parents = [best]
     if not _is_large(best):
         parents += search.each_without(best, sorted(best.names))
-    found = search.workers.results([("form_gains", (parent,)) for parent in parents])
+    found = search.workers.results([(form_gains, (parent,)) for parent in parents])
     chosen = {}
     for parent, gains in zip(parents, found, strict=True):
         # What a form gains where a member is gone must come near to what the member was worth.

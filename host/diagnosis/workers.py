@@ -12,8 +12,8 @@ from typing import Any
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 
-Task = tuple[str | Callable[..., Any], tuple[Any, ...]]
-"""A method of Fitter, or a function of a fitter and more, and its arguments."""
+Task = tuple[Callable[..., Any], tuple[Any, ...]]
+"""A function of a fitter and more, and what more it is given."""
 
 _fitter: Fitter
 
@@ -42,11 +42,11 @@ class Workers:
         """What each task returns, in order; `on_done` gets the number of each as it ends."""
         found = []
         if self._pool is None:
-            for number, (method, arguments) in enumerate(tasks):
-                found.append(_done(self._fitter, method, arguments))
+            for number, (function, arguments) in enumerate(tasks):
+                found.append(function(self._fitter, *arguments))
                 on_done(number)
             return found
-        waiting = [self._pool.submit(_call, method, arguments) for method, arguments in tasks]
+        waiting = [self._pool.submit(_call, *task) for task in tasks]
         for number, future in enumerate(waiting):
             found.append(future.result())
             on_done(number)
@@ -71,10 +71,6 @@ def leave_with_parent() -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def _call(method: str | Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-    result = _done(_fitter, method, arguments)
+def _call(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    result = function(_fitter, *arguments)
     return result.lean() if isinstance(result, Explanation) else result
-
-
-def _done(fitter: Fitter, method: str | Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-    return getattr(fitter, method)(*arguments) if isinstance(method, str) else method(fitter, *arguments)

@@ -8,6 +8,7 @@ from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.exchange import _likely, exchanged, twins
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.search import Search
+from host.diagnosis.trims import retrimmed
 from host.diagnosis.workers import Workers
 from host.recording import Array
 
@@ -33,7 +34,7 @@ def test_all_that_mend_a_bad_fit_alike_are_likely() -> None:
 
 def test_one_offset_becomes_another_of_the_same_force_and_moment(fitter: Fitter) -> None:
     moment = fitter.polished(fitter.grown(fitter.base, "trim_moment", []))
-    plane = fitter.retrimmed(moment, frozenset({"rudder_offset"}))
+    plane = retrimmed(fitter, moment, frozenset({"rudder_offset"}))
     assert plane.names == {"rudder_offset"}
     # The plane's zero is a force in heave as well, which this dive tells apart.
     assert fitter.base.bic - 100.0 > plane.bic > moment.bic
@@ -61,7 +62,7 @@ def test_a_neutral_depth_stands_still_beside_a_free_trim(fitter: Fitter) -> None
     neutral = with_trim.fit.structure.names.index("neutral_depth")
     assert not with_trim.fit.free[neutral]
     # Without the trim the neutral depth takes its force over, so that nothing is lost.
-    alone = fitter.retrimmed(with_trim, frozenset({"trim_moment"}))
+    alone = retrimmed(fitter, with_trim, frozenset({"trim_moment"}))
     assert alone.fit.free[neutral]
     assert np.isclose(alone.fit.log_likelihood, with_trim.fit.log_likelihood, atol=3.0)
 

@@ -38,7 +38,7 @@ def test_all_that_are_idle_go_at_once(fitter: Fitter, monkeypatch: pytest.Monkey
         results = workers.results
 
         def noted(tasks: Any, *more: Any) -> list[Any]:
-            shrunk.extend(arguments[1:] for method, arguments in tasks if method == "shrunk")
+            shrunk.extend(arguments[1:] for function, arguments in tasks if function is Fitter.shrunk)
             return results(tasks, *more)
 
         monkeypatch.setattr(workers, "results", noted)

@@ -23,6 +23,7 @@ from host.diagnosis.seas import (
     plain_waves,
 )
 from host.diagnosis.spans import divide
+from host.diagnosis.trims import retrimmed
 from host.diagnosis.workers import Workers
 from host.recording import Array
 from host.waves import mean_moment
@@ -130,7 +131,7 @@ def test_an_offset_that_is_the_waves_own_stays_in_the_model_without_a_name() -> 
     fitter = Fitter(spans.teaching)
     waves = plain_waves(fitter)
     assert waves is not None
-    best = fitter.retrimmed(waves, frozenset({"trim_moment"}))
+    best = retrimmed(fitter, waves, frozenset({"trim_moment"}))
     with Workers(fitter, 1) as workers:
         search = Search(fitter, workers, lambda _: None, fitter.base, waves)
         for theirs, named in (

@@ -23,11 +23,11 @@ if __name__ == "__main__":
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_methods_and_functions_of_a_fitter_are_called_in_order(jobs: int) -> None:
+def test_functions_of_a_fitter_are_called_in_order(jobs: int) -> None:
     fitter = Fitter([hidden_dive(duration=40.0)])
     ended: list[int] = []
     with Workers(fitter, jobs) as workers:
-        tasks = [("reduced", (fitter.root, frozenset())), (with_sea, (fitter.base,))]
+        tasks = [(Fitter.reduced, (fitter.root, frozenset())), (with_sea, (fitter.base,))]
         calm, rough = workers.results(tasks, ended.append)
     assert not calm.names
     assert not calm.fit.has_process_noise
