@@ -47,19 +47,21 @@ SHAPES: dict[str, Term] = {
 """Forms that change neither sign nor size with the motion as those of the catalogue do."""
 CUBES: dict[str, Term] = {f"{name}_cubed": _product(i, i, i) for i, name in enumerate(MOTION)}
 """These are close to entries of the catalogue: a sign that something is left, but no form of their own."""
+PLANE_SHAPES = {shape: term for shape, term in SHAPES.items() if "delta" in shape}
+"""Forms of what a plane does beyond its angle: force and moment together, as the plane makes them."""
 
 
-def _push(side: Side, shape: str, term: Term) -> Callable[[Chain], None]:
+def _push(side: Side, own: str, term: Term) -> Callable[[Chain], None]:
     def force(c: Chain) -> None:
-        value = c.p[f"{side}_{shape}"] * term((c.w, c.q, c.theta, c.plane)) * c.speed_ratio
+        value = c.p[own] * term((c.w, c.q, c.theta, c.plane)) * c.speed_ratio
         setattr(c, side, getattr(c, side) + value)
 
     return force
 
 
-def _share(side: Side, shape: str) -> Parameter:
+def _share(side: Side, shape: str, own: str) -> Parameter:
     return Parameter(
-        name=f"{side}_{shape}",
+        name=own,
         unit=f"({UNIT[side]})/({shape})",
         lower=-1e6,
         upper=1e6,
@@ -68,29 +70,57 @@ def _share(side: Side, shape: str) -> Parameter:
 
 
 def _of_motion(side: Side, shape: str, term: Term) -> Effect:
-    words = shape.replace("abs_", "the size of ").replace("_", " times ")
     return Effect(
         name=f"unknown_{KIND[side]}_{shape}",
         slot=side,
-        parameters=(_share(side, shape),),
-        sentence=f"A {KIND[side]} acts that goes with {words}, as nothing in the catalogue does.",
+        parameters=(_share(side, shape, f"{side}_{shape}"),),
+        sentence=f"A {KIND[side]} acts that goes with {_in_words(shape)}, as nothing in the catalogue does.",
         equation=f"{RATE[side]} = ... + {side}_{shape} {shape}",
         manoeuvre="steps of several sizes and both signs",
         probes=((0.0,),),
-        force=_push(side, shape, term),
+        force=_push(side, f"{side}_{shape}", term),
     )
+
+
+def _of_plane(shape: str, term: Term) -> Effect:
+    own = f"plane_{shape}"
+
+    def force(c: Chain) -> None:
+        beyond = c.p[own] * term((c.w, c.q, c.theta, c.plane)) * c.speed_ratio
+        c.heave += c.p["b1"] * beyond
+        c.pitch += c.p["b2"] * beyond
+
+    return Effect(
+        name=f"unknown_plane_{shape}",
+        slot="actuator",
+        parameters=(
+            Parameter(name=own, unit=f"rad/({shape})", lower=-1e6, upper=1e6, meaning="share of the term"),
+        ),
+        sentence=f"The plane acts as if it stood further over by an angle that goes with {_in_words(shape)}, "
+        "as nothing in the catalogue does.",
+        equation=f"w' = ... + b1 {own} {shape}, q' = ... + b2 {own} {shape}",
+        manoeuvre="steps of several sizes and both signs",
+        probes=((0.0,),),
+        force=force,
+    )
+
+
+def _in_words(shape: str) -> str:
+    return shape.replace("abs_", "the size of ").replace("_", " times ")
 
 
 def _any_smooth_force(c: Chain) -> None:
     for side in SIDES:
         for shape, term in (SHAPES | CUBES).items():
-            _push(side, shape, term)(c)
+            _push(side, f"any_{side}_{shape}", term)(c)
 
 
 ANY_SMOOTH_FORCE = Effect(
     name="any_smooth_force",
     slot="heave",
-    parameters=tuple(_share(side, shape) for side in SIDES for shape in SHAPES | CUBES),
+    parameters=tuple(
+        _share(side, shape, f"any_{side}_{shape}") for side in SIDES for shape in SHAPES | CUBES
+    ),
     sentence="A force or moment that depends on the motion acts, and no entry of the catalogue is it.",
     equation="w' = ... + P(w, q, theta, delta), q' = ... + R(w, q, theta, delta)",
     manoeuvre="steps of several sizes and both signs",
@@ -153,6 +183,7 @@ SWINGING_MOMENT = Effect(
 
 FORMS: tuple[Effect, ...] = (
     *(_of_motion(side, shape, term) for side in SIDES for shape, term in SHAPES.items()),
+    *(_of_plane(shape, term) for shape, term in PLANE_SHAPES.items()),
     *(_wandering(side) for side in SIDES),
     SWINGING_MOMENT,
 )

@@ -8,7 +8,7 @@ import numpy as np
 
 from host.catalogue import named, structure_of
 from host.catalogue.moments import COUNT, FIRST, LAST, SCANS, sizes
-from host.catalogue.unknown import ANY_SMOOTH_FORCE, FORMS
+from host.catalogue.unknown import ANY_SMOOTH_FORCE, FORMS, SHAPES
 from host.diagnosis.explanation import Explanation
 from host.equations import Effect
 from host.filter_error import whitened_innovations
@@ -38,27 +38,42 @@ def gain(fitter: "Fitter", parent: Explanation, name: str, values: list[Array], 
 def form_gains(fitter: "Fitter", parent: Explanation) -> dict[str, float]:
     """What each form of unknown physics could take off the BIC on top of the parent, predicted.
 
-    Those of the motion share the sensitivities of one propagation with all of them at zero.
+    Those of the motion share the sensitivities of one propagation with all of them at zero; those of the
+    plane are a force and a moment in the proportion in which it makes them.
     """
     names = parent.names | {ANY_SMOOTH_FORCE.name}
     structure, inputs = structure_of(names), fitter.inputs(names, parent.fit.has_process_noise)
     point = fitter.point(names, parent, ANY_SMOOTH_FORCE.name, np.zeros(len(ANY_SMOOTH_FORCE.parameters)))
     white, cost = whitened_at(point, inputs, parent)
-    own = {parameter.name for parameter in ANY_SMOOTH_FORCE.parameters}
-    free = fitter.free(names) & np.array([name not in own for name in structure.names])
+    own, any_smooth = np.array(structure.names), [p.name for p in ANY_SMOOTH_FORCE.parameters]
+    free = fitter.free(names) & ~np.isin(own, any_smooth)
     before, charge = parent.fit.deviance, log(parent.fit.samples)
     gains = {}
     for form in FORMS:
         if form.name in parent.names:
             continue
-        if form.parameters[0].name in own:
-            with_it = free | np.array([name == form.parameters[0].name for name in structure.names])
-            left = GaussNewton(white, point, with_it).predicted_cost(cost) if np.isfinite(cost) else np.inf
-            ahead = before - left
+        kind, _, shape = form.parameters[0].name.partition("_")
+        if shape in SHAPES:
+            seen = _of_plane(white, point, shape) if kind == "plane" else white
+            side = "heave" if kind == "plane" else kind
+            with_it = free | (own == f"any_{side}_{shape}")
+            is_lost = not np.isfinite(cost)
+            ahead = -np.inf if is_lost else before - GaussNewton(seen, point, with_it).predicted_cost(cost)
         else:
             ahead = gain(fitter, parent, form.name, [], is_thorough=True)
         gains[form.name] = ahead - charge * fitter.free_parameters(frozenset({form.name}))
     return gains
+
+
+def _of_plane(white: list[tuple[Array, Array]], point: Point, shape: str) -> list[tuple[Array, Array]]:
+    """Sensitivities to a form in heave replaced by those to the same form of the plane."""
+    names = point.structure.names
+    b1, b2 = (point.parameters[names.index(name)] for name in ("b1", "b2"))
+    heave, pitch = (names.index(f"any_{side}_{shape}") for side in ("heave", "pitch"))
+    moved = [S.copy() for _, S in white]
+    for S in moved:
+        S[:, heave] = b1 * S[:, heave] + b2 * S[:, pitch]
+    return [(e, S) for (e, _), S in zip(white, moved, strict=True)]
 
 
 def probed(

@@ -4,13 +4,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hidden_dive import hidden_dive
+from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import BY_NAME, UNKNOWN, named, structure_of
 from host.catalogue.unknown import FORMS
 from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.files import write_extended_model
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.prospects import form_gains, gain
 from host.diagnosis.report import summary
 from host.equations import Effect
 from host.model import read_model
@@ -53,6 +55,28 @@ def test_a_mass_that_turns_is_unexplained_and_described(tmp_path: Path) -> None:
     model = read_model(path)
     assert [effect["name"] for effect in model.effects] == ["unknown_swinging_moment"]
     assert predict(model, dive).score.depth_rmse_m < 0.05
+
+
+def test_what_forms_promise_is_foretold_together_as_one_by_one() -> None:
+    fitter = Fitter([hidden_dive(duration=40.0)])
+    parent = fitter.grown(fitter.base, "unknown_force_w_delta", [])
+    together = form_gains(fitter, parent)
+    assert "unknown_force_w_delta" not in together
+    charge = np.log(parent.fit.samples)
+    for name in ("unknown_plane_q_delta", "unknown_plane_abs_delta", "unknown_moment_w_delta"):
+        alone = gain(fitter, parent, name, [], is_thorough=True)
+        assert together[name] == pytest.approx(alone - charge, abs=1e-3)
+
+
+def test_a_plane_that_bites_better_to_one_side_is_told_by_its_force_and_moment_together() -> None:
+    def one_sided(_: float, __: np.ndarray, plane: float) -> tuple[float, float, float]:  # type: ignore[type-arg]
+        beyond = 0.2 * abs(plane)
+        return BASE["b1"] * beyond, BASE["b2"] * beyond, 0.0
+
+    found = diagnose([hidden_dive(one_sided, duration=100.0)])
+    assert found.verdict == "unexplained"
+    assert "unknown_plane_abs_delta" in found.extended.names
+    assert found.slots["actuator"] > 0.9
 
 
 @pytest.mark.parametrize("form", FORMS, ids=lambda form: form.name)
