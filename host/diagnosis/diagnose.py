@@ -15,7 +15,6 @@ from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
 from host.diagnosis.locate import Location, locate
 from host.diagnosis.plane_choice import Way, by_single_effects, is_likelier, ways
-from host.diagnosis.prospects import form_gains
 from host.diagnosis.pruning import leanest
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.sea_fits import WAVES, again_in_waves, with_regular_waves, with_sea
@@ -254,7 +253,7 @@ def _slots(
         for name, worth in found.items():
             shares[named(name).slot] += float(np.clip(worth, 0.0, MOST_WORTH))
     elif verdict != "no_mismatch":
-        for name, gain in (search.gains(best) | form_gains(search.fitter, best)).items():
+        for name, gain in search.gains(best).items():
             slot = named(name).slot
             shares[slot] = max(shares[slot], gain if np.isfinite(gain) else 0.0)
     total = sum(shares.values())
