@@ -181,6 +181,11 @@ SWINGING_MOMENT = Effect(
     force=_swinging_moment,
 )
 
+AS_OF_PLANE = {
+    f"unknown_{kind}_{shape}": f"unknown_plane_{shape}" for kind in KIND.values() for shape in PLANE_SHAPES
+}
+"""Forms in heave or pitch alone, and those of the plane that do the same there."""
+
 FORMS: tuple[Effect, ...] = (
     *(_of_motion(side, shape, term) for side in SIDES for shape, term in SHAPES.items()),
     *(_of_plane(shape, term) for shape, term in PLANE_SHAPES.items()),

@@ -7,6 +7,7 @@ the search found grows further only in competition with these forms.
 """
 
 from host.catalogue import BY_NAME, UNKNOWN
+from host.catalogue.unknown import AS_OF_PLANE
 from host.diagnosis.exchange import exchanged
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.margins import FEW, LARGEST_SET, LITTLE, NAMING_MARGIN, SMALL, margin
@@ -90,7 +91,10 @@ def _grown(search: Search, best: Explanation) -> list[Explanation]:
         # What a form gains where a member is gone must come near to what the member was worth.
         least = max(NAMING_MARGIN, FAIR_PART * (parent.bic - best.bic))
         likely = sorted((name for name in gains if gains[name] > least), key=lambda name: -gains[name])
-        for name in likely[: PROMISING if len(best.names) <= SMALL else 1]:
+        del likely[PROMISING if len(best.names) <= SMALL else 1 :]
+        # Where a plane makes both, its force or its moment alone promises nearly as much.
+        of_plane = (AS_OF_PLANE[name] for name in likely if name in AS_OF_PLANE)
+        for name in (*likely, *(name for name in of_plane if name in gains)):
             chosen[parent.names | {name}] = parent, name
     gains = search.gains(best, is_thorough=not _is_large(best))
     for name in sorted(gains, key=lambda name: -gains[name])[:FEW]:

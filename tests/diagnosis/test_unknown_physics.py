@@ -7,7 +7,7 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import BY_NAME, UNKNOWN, named, structure_of
-from host.catalogue.unknown import FORMS
+from host.catalogue.unknown import AS_OF_PLANE, FORMS
 from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.files import write_extended_model
@@ -85,6 +85,12 @@ def test_forms_are_described_and_are_no_entries(form: Effect) -> None:
     assert named(form.name) is form is UNKNOWN[form.name]
     assert form.sentence.endswith(".")
     assert form.equation.startswith(("w' =", "q' ="))
+
+
+def test_what_acts_at_the_plane_in_one_equation_has_a_form_in_both() -> None:
+    assert {*AS_OF_PLANE, *AS_OF_PLANE.values()} <= UNKNOWN.keys()
+    with_plane = [form for form in FORMS if "delta" in form.name and form.slot != "actuator"]
+    assert {form.name for form in with_plane} == {*AS_OF_PLANE}
 
 
 def test_all_forms_together_have_names_of_their_own() -> None:
