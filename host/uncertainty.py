@@ -32,7 +32,7 @@ def covariance_within(fit: Fit) -> Array:
     """
     free = fit.free
     M = fit.information[np.ix_(free, free)]
-    inverse = _safe_inverse(M)
+    inverse = safe_inverse(M)
     if not all(is_white(e) for e in fit.whitened):
         half = inverse @ _root(_coloured_information(fit))
         blind = np.diag(np.where(np.diag(M) > 0.0, 0.0, np.diag(inverse)))  # what is not seen has no colour
@@ -42,7 +42,7 @@ def covariance_within(fit: Fit) -> Array:
     return full
 
 
-def _safe_inverse(M: Array) -> Array:
+def safe_inverse(M: Array) -> Array:
     """Inverse by scaled eigenvectors; directions without information get a huge but finite variance."""
     M = np.nan_to_num(M, nan=0.0, posinf=1e100, neginf=-1e100)
     scale = np.sqrt(np.clip(np.diag(M), 1e-100, None))

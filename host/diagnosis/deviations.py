@@ -18,7 +18,7 @@ from host.gauss_newton import GaussNewton, Point
 from host.output_error import output_error
 from host.recording import Array
 from host.straightened import stepped
-from host.uncertainty import covariance
+from host.uncertainty import covariance, safe_inverse
 from host.whiteness import correlation_factor
 
 HALF_WIDTH = 1.96  # deviations, of an interval that holds the truth 95 times in 100
@@ -62,11 +62,12 @@ def _profiled(fitter: Fitter, explanation: Explanation, std: dict[str, float]) -
     fit, found = explanation.fit, {}
     free = np.flatnonzero(fit.free)
     white = np.zeros((fit.free.size, fit.free.size))
-    white[np.ix_(free, free)] = np.linalg.pinv(fit.information[np.ix_(free, free)], hermitian=True)
+    white[np.ix_(free, free)] = safe_inverse(fit.information[np.ix_(free, free)])
     for name, known in std.items():
         k = fit.structure.names.index(name)
         found[name] = known
-        if known > 0.0 and white[k, k] > 0.0:
+        bounds = fit.structure.parameters[k]
+        if white[k, k] < (bounds.upper - bounds.lower) ** 2 / 12.0:  # else the recording tells nothing of it
             ahead = white[:, k] / white[k, k]
             limit = (HALF_WIDTH * known) ** 2 / white[k, k]
             sides = (_distance(fitter, explanation, k, side * ahead, known, limit) for side in (-1.0, 1.0))
