@@ -187,7 +187,7 @@ EFFECTS = (
         name="rudder_stall",
         slot="actuator",
         parameters=(
-            Parameter(name="stall_angle", unit="rad", lower=0.01, upper=1.5, meaning="where lift breaks"),
+            Parameter(name="stall_angle", unit="rad", lower=0.005, upper=1.5, meaning="where lift breaks"),
             Parameter(name="stall_loss", unit="1", lower=0.5, upper=3, meaning="1: flat, more: falling lift"),
             Parameter(name="stall_share", unit="1", lower=0, upper=1, meaning="of the greatest lift, kept"),
         ),
