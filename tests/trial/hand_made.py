@@ -15,7 +15,7 @@ def answer(case: str = "one", hidden: tuple[str, ...] = ("trim_moment",), **chan
         "number": 1,
         "case": case,
         "hidden": list(hidden),
-        "slots": [slots[name] for name in hidden],
+        "slots": [slots.get(name, "") for name in hidden],
         "sizes": dict.fromkeys(hidden, 1.0),
         "misfits": dict.fromkeys(hidden, 400.0),
         "base": {"a1": -0.5, "u0": 2.0},

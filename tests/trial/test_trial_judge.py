@@ -104,6 +104,8 @@ def test_the_lead_of_the_true_structure_tells_a_missed_search_from_a_tie() -> No
     assert judge(answer(), recorded(), said, true_heldout=true).truth_lead == pytest.approx(20.0)
     assert judge(answer(), recorded(), said).truth_lead is None
     assert judged(answer(), effect("trim_moment")).truth_lead == 0.0
+    at_sea = answer(hidden=("surface_waves",), slots=["environment"])
+    assert judge(at_sea, recorded(), said, true_heldout=true).truth_lead is None
 
 
 def test_held_out_noise_is_that_of_the_spans_where_they_are_told() -> None:

@@ -48,6 +48,15 @@ def test_score_counts_each_question_over_its_own_cases() -> None:
     assert result.errors["c_q0"][0] == pytest.approx(0.05)
 
 
+@pytest.mark.parametrize(("bic", "missed"), [(-100.0, 1), (-115.0, 0)])
+def test_what_the_search_missed_is_told_from_ties(bic: float, missed: int) -> None:
+    true = {"depth_rmse_m": 0.1, "pitch_rmse_rad": 0.01, "bic": -120.0}
+    said = diagnosis(effect("net_buoyancy")) | {"bic": bic}
+    judged = [judge(answer(), recorded(), said, true_heldout=true)]
+    found = rates(score(judged))
+    assert found["hidden: missed by the search, as the true set is likelier by 6 of BIC"] == (missed, 1)
+
+
 def test_a_failure_with_nothing_hidden_is_not_silence() -> None:
     result = score([judge(answer("none", ()), recorded(), None)])
     assert rates(result)["nothing hidden: something named"] == (1, 1)

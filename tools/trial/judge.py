@@ -139,7 +139,7 @@ def judge(
         over_floor=_over_floor(answer, recorded, diagnosis, "extended"),
         base_over_floor=_over_floor(answer, recorded, diagnosis, "base"),
         over_truth=1.0 if is_exact else _over_truth(diagnosis, true_heldout),
-        truth_lead=0.0 if is_exact else _truth_lead(diagnosis, true_heldout),
+        truth_lead=0.0 if is_exact else _truth_lead(answer, diagnosis, true_heldout),
         effect_coefficients=_effect_coefficients(answer, effects) if is_exact else [],
         base_coefficients=_base_coefficients(answer, model) if is_exact else [],
         seconds=seconds,
@@ -190,8 +190,17 @@ def _over_truth(diagnosis: dict[str, Any] | None, true: dict[str, Any] | None) -
     return sqrt(sum((error / reached) ** 2 for error, reached in channels) / 2)
 
 
-def _truth_lead(diagnosis: dict[str, Any] | None, true: dict[str, Any] | None) -> float | None:
-    if diagnosis is None or true is None or diagnosis.get("bic") is None or true.get("bic") is None:
+def _truth_lead(
+    answer: Answer, diagnosis: dict[str, Any] | None, true: dict[str, Any] | None
+) -> float | None:
+    """None beside waves: a fit that is told of them has one regular wave, and no likelihood of the others."""
+    if (
+        "surface_waves" in answer.hidden
+        or diagnosis is None
+        or true is None
+        or diagnosis.get("bic") is None
+        or true.get("bic") is None
+    ):
         return None
     return float(diagnosis["bic"] - true["bic"])
 

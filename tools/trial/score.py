@@ -10,6 +10,7 @@ from tools.trial.hidden import KINDS, STRANGERS
 from tools.trial.judge import NOTHING, Coefficient, Judged
 
 NEGLIGIBLE = 0.1  # of BIC: two fits of one set
+MISSED = 6.0  # of BIC, that a name must be worth
 BANDS = ((50.0, 300.0), (300.0, 2000.0), (2000.0, 20000.0))  # of misfit; weaker effects are harder to name
 
 
@@ -81,6 +82,9 @@ def score(judged: list[Judged]) -> Score:
         _rate("two hidden: both named or in a class of at most 3", two, lambda j: bool(j.are_in_class)),
         _rate("two hidden: those and nothing else named", two, lambda j: j.is_exact),
         _rate("two hidden: no other set is likelier than the true one", two, _is_likeliest),
+        _rate(
+            "hidden: missed by the search, as the true set is likelier by 6 of BIC", [*one, *two], _is_missed
+        ),
         _rate("nothing hidden: something named", none, lambda j: bool(j.named) or j.has_failed, most=0.02),
         _rate("nothing hidden: verdict no_mismatch", none, lambda j: j.verdict == "no_mismatch"),
         _rate("outside physics: unexplained or partly explained", outside, lambda j: j.admits, 0.90),
@@ -153,6 +157,10 @@ def _rate(
 
 def _is_likeliest(judged: Judged) -> bool:
     return judged.truth_lead is not None and judged.truth_lead >= -NEGLIGIBLE
+
+
+def _is_missed(judged: Judged) -> bool:
+    return judged.has_failed or (judged.truth_lead is not None and judged.truth_lead > MISSED)
 
 
 def _within(ratio: float | None, limit: float) -> bool:
