@@ -128,6 +128,15 @@ def test_coefficients_and_their_intervals() -> None:
     assert [c.name for c in given.base_coefficients] == ["a1"]
 
 
+def test_coefficients_that_go_with_speed_are_not_judged_where_it_varies() -> None:
+    truth = {"munk_moment": {"c_qw": 1.0}}
+    said = diagnosis(effect("munk_moment", c_qw=(0.7, 0.1)))
+    steady = answer(hidden=("munk_moment",), coefficients=truth)
+    slowing = answer(hidden=("munk_moment",), coefficients=truth, usual=["speed_loss"])
+    assert len(judge(steady, recorded(), said).effect_coefficients) == 1
+    assert not judge(slowing, recorded(), said).effect_coefficients
+
+
 def test_buoyancy_beyond_the_weight_restores_as_well() -> None:
     light = answer(
         hidden=("net_buoyancy",), base={"a3": -1.0}, sizes={"net_buoyancy": 0.981},

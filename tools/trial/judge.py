@@ -10,6 +10,7 @@ from tools.trial.answers import Answer
 from tools.trial.coefficients import lifted
 
 LARGEST_CLASS = 3
+PROPORTIONAL_TO_SPEED = ("c_wq", "c_qw")
 NOTHING = "nothing"
 
 
@@ -206,9 +207,12 @@ def _truth_lead(
 
 
 def _effect_coefficients(answer: Answer, effects: list[dict[str, Any]]) -> list[Coefficient]:
+    slows = "speed_loss" in (*answer.hidden, *answer.usual)
     found = []
     for effect in effects:
         for name, truth in answer.coefficients.get(effect["name"], {}).items():
+            if slows and name in PROPORTIONAL_TO_SPEED:
+                continue  # as of the base coefficients
             found += _coefficient(answer, name, truth, effect["coefficients"].get(name))
     return found
 
