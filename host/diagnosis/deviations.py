@@ -10,7 +10,6 @@ There the others follow one Gauss-Newton step ahead. Correlated residuals repeat
 
 import numpy as np
 
-from host.catalogue import named
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.prospects import whitened_at
@@ -49,23 +48,6 @@ def deviations(fitter: Fitter, explanation: Explanation) -> dict[str, float]:
         reach = max(_reach(fitter, explanation, name, side) for side in (-1.0, 1.0))
         std[name] = float(np.clip(reach / HALF_WIDTH, least, most))
     return std
-
-
-def empty_in(fitter: Fitter, explanation: Explanation, gains: dict[str, float]) -> list[str]:
-    """Of the members with such gains on held-out spans, those without any whose sizes may all be none.
-
-    They pay on what teaches, by chance or for an error of the numbers, and are no physics.
-    """
-    idle = [name for name in sorted(gains) if gains[name] <= 0.0 and named(name).size_names]
-    if not idle:
-        return []
-    fit, std = explanation.fit, deviations(fitter, explanation)
-    values = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
-
-    def may_be_none(name: str) -> bool:
-        return all(abs(values[size]) < HALF_WIDTH * std[size] for size in named(name).size_names)
-
-    return [name for name in idle if may_be_none(name)]
 
 
 def interval(effect: Effect, name: str, value: float, std: float) -> tuple[float, float]:

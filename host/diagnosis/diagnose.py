@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from host.catalogue import BY_NAME, UNKNOWN, named
-from host.diagnosis.deviations import deviations, empty_in
+from host.diagnosis.deviations import deviations
 from host.diagnosis.exchange import twins
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
@@ -123,8 +123,6 @@ def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], 
         )
         if again is None:
             judged = _judge(explained, spans, floor, on_progress)
-            if spans.judging and (fewer := _less_empty(explained, judged)) is not explained:
-                explained, judged = fewer, _judge(fewer, spans, floor, on_progress)
     if again is not None:
         on_progress("the plane between rows")
         return _diagnosed(again, [], on_progress, jobs)
@@ -178,16 +176,6 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
     without_it = after if waves is None else misfit(waves.fitted, spans, floor)
     verdict = verdict_on(model, left, before, without_it, evidence(waves))
     return Judged(before, after, effects, verdict, _slots(search, best, effects, verdict))
-
-
-def _less_empty(explained: Explained, judged: Judged) -> Explained:
-    """Without the members that neither held-out spans nor their intervals speak for."""
-    best, search = explained.best, explained.search
-    gains = {effect.name: effect.heldout_gain for effect in judged.effects}
-    if explained.waves is not None or not (empty := empty_in(search.fitter, best, gains)):
-        return explained
-    fewer = search.without_all(best, empty)
-    return explained._replace(best=fewer, left=leftover(search.fitter, fewer))
 
 
 def _explain(

@@ -6,16 +6,9 @@ import numpy as np
 import pytest
 from hidden_dive import hidden_dive
 
-from host.diagnosis.deviations import HALF_WIDTH, deviations, empty_in
-from host.diagnosis.diagnose import Judged, NamedEffect, _less_empty
+from host.diagnosis.deviations import HALF_WIDTH, deviations
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.leftover import leftover
-from host.diagnosis.scoring import misfit
-from host.diagnosis.search import Search
-from host.diagnosis.seas import Explained
-from host.diagnosis.spans import Spans
-from host.diagnosis.workers import Workers
 from host.equations import NAMES
 from host.fit import Fit
 from host.gauss_newton import Point
@@ -72,40 +65,3 @@ def test_a_profile_that_never_falls_ends_at_a_bound() -> None:
     k = base.fit.structure.names.index("a1")
     farthest = base.fit.parameters[k] - base.fit.structure.parameters[k].lower
     assert deviations(fitter, base)["a1"] * HALF_WIDTH == pytest.approx(farthest)
-
-
-@cache
-def dragged() -> tuple[Fitter, Explanation]:
-    """A hull with much quadratic damping, of which a Munk moment that is not there is named as well."""
-
-    def damping(_: float, x: np.ndarray, __: float) -> tuple[float, float, float]:  # type: ignore[type-arg]
-        return 0.0, -8.0 * x[1] * abs(x[1]), 0.0
-
-    fitter = Fitter([hidden_dive(damping, duration=60.0)])
-    damped = fitter.grown(fitter.base, "pitch_quadratic_damping", [])
-    return fitter, fitter.polished(fitter.grown(damped, "munk_moment", []))
-
-
-@pytest.mark.parametrize(
-    ("gains", "empty"),
-    [
-        ({"munk_moment": -0.01, "pitch_quadratic_damping": -0.01}, ["munk_moment"]),
-        ({"munk_moment": 0.01, "pitch_quadratic_damping": 0.5}, []),
-    ],
-)
-def test_what_neither_held_out_spans_nor_its_interval_speak_for_is_empty(
-    gains: dict[str, float], empty: list[str]
-) -> None:
-    assert empty_in(*dragged(), gains) == empty
-
-
-def test_an_empty_member_leaves_the_answer() -> None:
-    fitter, both = dragged()
-    with Workers(fitter, 1) as workers:
-        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
-        explained = Explained(search.remember(both), search, leftover(fitter, both), None)
-        names = [NamedEffect(name=name, delta_bic=9.0, heldout_gain=-0.01) for name in sorted(both.names)]
-        nothing = misfit(both, Spans(fitter.recordings, []), fitter.floor)
-        fewer = _less_empty(explained, Judged(nothing, nothing, names, "explained", {}))
-    assert fewer.best.names == {"pitch_quadratic_damping"}
-    assert fewer.left.is_nothing
