@@ -96,9 +96,15 @@ def _attempt(rng: np.random.Generator, number: int, card: Card, has_usual: bool)
     if len(acting) == 1:
         beyond = hidden[0].is_foreign
         misfits = {hidden[0].name: linear_misfit(voyage, outing, setting, noise, beyond)}
+    calm = tuple(effect for effect in acting if effect.name != "surface_waves")
+    heard = noise
+    if 0 < len(calm) < len(acting):
+        still = sail(outing.scenario, seed, calm, setting, voyage.command)
+        heard = noise.among_waves(voyage, still, outing.rate_hz)
     for effect in hidden if len(acting) > 1 else ():
         others = tuple(other for other in acting if other is not effect)
-        misfit = misfit_beside(voyage, outing, seed, others, setting, noise, MISFIT)
+        beside = heard if effect in calm else noise
+        misfit = misfit_beside(voyage, outing, seed, others, setting, beside, MISFIT)
         if misfit < MISFIT:
             return None
         misfits[effect.name] = misfit

@@ -23,7 +23,8 @@ def remaining(
     Over noise of unit deviation this is the expected gain in chi2 of whoever knows what is hidden. Stops
     early once below `least`.
 
-    is_dear    take differences once and then learn the slopes from each step (Broyden's update)
+    is_dear    learn the slopes from each step (Broyden's update) and take differences again only where
+               learnt ones no longer lead down
     """
     best = start
     residual = model(best[None, :])[0]
@@ -31,10 +32,9 @@ def remaining(
     if not np.isfinite(cost):
         return np.inf
     damping = 1e-4
+    learnt = False
     slopes = _slopes(model, best, residual, steps)
-    for iteration in range(most_iterations):
-        if iteration > 0 and not is_dear:
-            slopes = _slopes(model, best, residual, steps)
+    for _ in range(most_iterations):
         scale = np.sqrt(np.sum(slopes**2, axis=1)) + 1e-12
         scaled = slopes / scale[:, None]
         before = cost
@@ -53,8 +53,11 @@ def remaining(
                 damping = max(damping / 10, 1e-9)
                 break
             damping *= 10
-        if cost < least or cost > 0.99 * before:
+        if cost < least or (cost > 0.99 * before and not learnt):
             break
+        learnt = is_dear and cost < 0.8 * before
+        if not learnt:
+            slopes = _slopes(model, best, residual, steps)
     return cost
 
 

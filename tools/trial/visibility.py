@@ -18,6 +18,7 @@ Array = npt.NDArray[np.float64]
 
 MOST_PITCH = 1.0  # rad; no vehicle of this kind goes further
 LEAST_DEPTH = 1.0  # m, or the hull would leave the water
+WAVE_BAND_HZ = 0.02  # over which a sea's spectrum is taken for smooth
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,16 +29,41 @@ class Yardstick:
     depth_noise: float
     has_pitch: npt.NDArray[np.bool_]
     has_depth: npt.NDArray[np.bool_]
+    pitch_hearing: Array | None = None
+    depth_hearing: Array | None = None
+    """Noise over noise and waves, at each frequency: waves hide misfits, as nobody knows their course."""
 
     def residual(self, pitch: Array, depth: Array, truth: Voyage) -> Array:
-        """Differences to the truth over the noise, where measured; the last axis runs over samples."""
-        return np.concatenate(
-            [
-                (pitch - truth.pitch)[..., self.has_pitch] / self.pitch_noise,
-                (depth - truth.depth)[..., self.has_depth] / self.depth_noise,
-            ],
-            axis=-1,
+        """Differences to the truth over the noise, 0 where none arrived; the last axis runs over samples."""
+        pitch_off = np.where(self.has_pitch, (pitch - truth.pitch) / self.pitch_noise, 0.0)
+        depth_off = np.where(self.has_depth, (depth - truth.depth) / self.depth_noise, 0.0)
+        heard = [_heard(self.pitch_hearing, pitch_off), _heard(self.depth_hearing, depth_off)]
+        return np.concatenate(heard, axis=-1)
+
+    def among_waves(self, sea: Voyage, calm: Voyage, rate_hz: float) -> "Yardstick":
+        """The same instruments in waves, which are all that the two runs differ in."""
+        return replace(
+            self,
+            pitch_hearing=_hearing((sea.pitch - calm.pitch) / self.pitch_noise, rate_hz),
+            depth_hearing=_hearing((sea.depth - calm.depth) / self.depth_noise, rate_hz),
         )
+
+
+def _hearing(waves: Array, rate_hz: float) -> Array:
+    """1 / sqrt(1 + S), S the spectrum of waves over that of white noise of unit deviation, smoothed."""
+    rows = len(waves)
+    window = np.hanning(rows)  # or the ends of strong waves would be taken for waves of every frequency
+    spectrum = np.abs(np.fft.rfft(window * (waves - waves.mean()), 2 * rows)) ** 2 / float(window @ window)
+    width = 2 * round(WAVE_BAND_HZ * rows / rate_hz) + 1
+    return np.asarray(1.0 / np.sqrt(1.0 + np.convolve(spectrum, np.full(width, 1.0 / width), "same")))
+
+
+def _heard(hearing: Array | None, misfit: Array) -> Array:
+    """Filtered without delay, into twice as many rows; the sum of squares is the chi2 in noise and waves."""
+    if hearing is None:
+        return misfit
+    rows = 2 * misfit.shape[-1]
+    return np.asarray(np.fft.irfft(np.fft.rfft(misfit, rows) * hearing, rows))
 
 
 def yardstick(scenario: Scenario, seed: int, voyage: Voyage) -> Yardstick:
@@ -113,7 +139,7 @@ def misfit_beside(
     first = np.array(
         [1.0] * (len(derivatives) + len(speeds) + len(others)) + [getattr(start, name) for name in STATE]
     )
-    steps = np.array([1e-3] * (len(first) - 4) + [1e-3] * 4)
+    steps = np.full(len(first), 1e-3)
 
     def run(values: Array) -> Array:
         shares = iter(values.tolist())
@@ -125,13 +151,15 @@ def misfit_beside(
         other_run = sail(scenario, seed, scaled, setting, voyage.command)
         return noise.residual(other_run.pitch, other_run.depth, voyage)
 
+    lost = len(noise.residual(voyage.pitch, voyage.depth, voyage))
+
     def model(sets: Array) -> Array:
         rows = []
         for values in sets:
             try:
                 rows.append(run(values))
             except (ScenarioError, OverflowError):
-                rows.append(np.full(int(noise.has_pitch.sum() + noise.has_depth.sum()), np.inf))
+                rows.append(np.full(lost, np.inf))
         return np.array(rows)
 
-    return remaining(model, first, steps, most_iterations=6, least=least, is_dear=True)
+    return remaining(model, first, steps, least=least, is_dear=True)
