@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 from host.fit import Fit
+from host.whiteness import is_even, is_white
 
 Names = frozenset[str]
 
@@ -14,6 +15,11 @@ class Explanation:
     names: Names
     fit: Fit
     bic: float
+
+    @property
+    def leaves_white(self) -> bool:
+        """Whether its innovations are white, fast and slow."""
+        return all(is_white(e) and is_even(e) for e in self.fit.whitened)
 
     def lean(self) -> "Explanation":
         """Without the sensitivities of every row: those of a whole search fill the memory."""

@@ -5,7 +5,7 @@ re-estimated with the base whenever one joins, members that no longer pay are dr
 best set is exchanged for every other effect that might do its work. Each effect is fitted alone; what it
 could gain beside others is predicted by one Gauss-Newton step from there, and the promising ones are fitted.
 Where one effect leaves much, or many were needed, what every vehicle has is fitted together and pruned
-(host.diagnosis.together).
+(host.diagnosis.together), unless one form of unknown physics leaves less (host.diagnosis.lone_form).
 """
 
 from collections.abc import Callable, Iterable
@@ -19,6 +19,7 @@ from host.diagnosis.absence import promises_more
 from host.diagnosis.exchange import exchanged
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.lone_form import lone_form
 from host.diagnosis.margins import FEW, LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN, ROUGH, SMALL, margin
 from host.diagnosis.offset_choice import with_best_offsets, with_offset
 from host.diagnosis.prospects import gain
@@ -26,7 +27,6 @@ from host.diagnosis.pruning import pruned
 from host.diagnosis.together import completed, together
 from host.diagnosis.workers import Task, Workers
 from host.recording import Array
-from host.whiteness import is_even, is_white
 
 BEAM = 4  # single effects carried on
 FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
@@ -72,18 +72,24 @@ class Search:
             self.on_progress("settling")
             settled = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
             return self._settled(min(settled, key=lambda e: e.bic))
+        foreign: Explanation | None = None
         for size in range(1, LARGEST_SET + 1):
-            if self._needs_many(beam[0], size) and together(self, beam[0]) is not None:
+            if foreign is None and self._needs_many(beam[0], size) and together(self, beam[0]) is not None:
                 break
             grown = self.singles() if size == 1 else self._grown(beam, size)
             best_before = min(e.bic for e in beam)
             beam = self._parents(grown)[: BEAM if size == 1 else NARROW]
             if size == 1 and beam and self.fitter.excess(beam[0].fit) > LITTLE:
                 beam = [*with_offset(self, beam[:NARROW]), *beam[NARROW:]][:BEAM]
-            if beam and self._leaves_nothing(beam[0]):
+            if beam and beam[0].leaves_white and self.fitter.excess(beam[0].fit) < LITTLE:
                 del beam[1:]  # whatever grows from the others is not likelier
+            if foreign is not None and (not beam or foreign.bic < beam[0].bic - margin(foreign)):
+                self.remember(foreign)
+                break
             if not beam or beam[0].bic > best_before - margin(beam[0]):
                 break
+            if size == 1 and self._may_be_foreign(beam[0]):
+                foreign = lone_form(self, beam[0])
         self.on_progress("settling")
         return completed(self, self._settled(with_best_offsets(self)))
 
@@ -189,6 +195,10 @@ class Search:
             return False
         return self.fitter.excess(leading.fit) > (MUCH if size <= SMALL else LITTLE)
 
+    def _may_be_foreign(self, leading: Explanation) -> bool:
+        """Whether one effect leaves so much that a form of unknown physics is worth a look already."""
+        return not self.root.fit.has_process_noise and self.fitter.excess(leading.fit) > LITTLE
+
     def _parents(self, grown: list[Explanation]) -> list[Explanation]:
         """The best sets, as far as they explain a fair part of what the very best does."""
         ordered = sorted(grown, key=lambda e: e.bic)[:BEAM]
@@ -255,10 +265,6 @@ class Search:
     def is_hopeless(self, best: Explanation) -> bool:
         """Whether much is left although all that every vehicle has was tried at once."""
         return bool(self.joint) and self.fitter.excess(best.fit) > MUCH
-
-    def _leaves_nothing(self, leading: Explanation) -> bool:
-        white = all(is_white(e) and is_even(e) for e in leading.fit.whitened)
-        return white and self.fitter.excess(leading.fit) < LITTLE
 
     def _candidates(self, parent: Explanation) -> list[str]:
         """What may join a set: the offsets only once the free trim, which does their work, has gone.

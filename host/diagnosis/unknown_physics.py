@@ -7,17 +7,15 @@ the search found grows further only in competition with these forms.
 """
 
 from host.catalogue import BY_NAME, UNKNOWN
-from host.catalogue.unknown import AS_OF_PLANE
 from host.diagnosis.exchange import exchanged
 from host.diagnosis.explanation import Explanation
+from host.diagnosis.lone_form import FAIR_PART, PROMISING, likely_forms
 from host.diagnosis.margins import FEW, LARGEST_SET, LITTLE, NAMING_MARGIN, SMALL, margin
 from host.diagnosis.prospects import form_gains
 from host.diagnosis.pruning import pruned
 from host.diagnosis.search import Search
 from host.diagnosis.together import completed
 
-PROMISING = 2  # forms beside each set that are fitted in earnest
-FAIR_PART = 0.3  # of what a member was worth, that a form in its place must promise: predictions are local
 MOST_ROUNDS = 8
 MOST_TOLD = 3  # coefficients that a sentence can hold
 
@@ -90,11 +88,7 @@ def _grown(search: Search, best: Explanation) -> list[Explanation]:
     for parent, gains in zip(parents, found, strict=True):
         # What a form gains where a member is gone must come near to what the member was worth.
         least = max(NAMING_MARGIN, FAIR_PART * (parent.bic - best.bic))
-        likely = sorted((name for name in gains if gains[name] > least), key=lambda name: -gains[name])
-        del likely[PROMISING if len(best.names) <= SMALL else 1 :]
-        # Where a plane makes both, its force or its moment alone promises nearly as much.
-        of_plane = (AS_OF_PLANE[name] for name in likely if name in AS_OF_PLANE)
-        for name in (*likely, *(name for name in of_plane if name in gains)):
+        for name in likely_forms(gains, least, PROMISING if len(best.names) <= SMALL else 1):
             chosen[parent.names | {name}] = parent, name
     gains = search.gains(best, is_thorough=not _is_large(best))
     for name in sorted(gains, key=lambda name: -gains[name])[:FEW]:

@@ -12,8 +12,11 @@ from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.files import write_extended_model
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.lone_form import likely_forms, lone_form
 from host.diagnosis.prospects import form_gains, gain
 from host.diagnosis.report import summary
+from host.diagnosis.search import Search
+from host.diagnosis.workers import Workers
 from host.equations import Effect
 from host.model import read_model
 from host.predict import predict
@@ -40,9 +43,13 @@ def test_a_mass_that_turns_is_unexplained_and_described(tmp_path: Path) -> None:
         return 0.0, 0.08 * np.sin(2.0 * np.pi * time / 11.0), 0.0
 
     dive = hidden_dive(turning, duration=100.0)
-    found = diagnose([dive])
+    stages: list[str] = []
+    found = diagnose([dive], stages.append)
     assert found.verdict == "unexplained"
     assert not found.effects
+    # One form leaves so little that nothing larger need be tried.
+    assert "one form of unknown physics" in stages
+    assert "what every vehicle has" not in stages
     values = dict(zip(found.extended.fit.structure.names, found.extended.fit.parameters, strict=True))
     assert values["swing_period"] == pytest.approx(11.0, rel=0.01)
     assert np.hypot(values["swing_sine"], values["swing_cosine"]) == pytest.approx(0.08, rel=0.05)
@@ -66,6 +73,29 @@ def test_what_forms_promise_is_foretold_together_as_one_by_one() -> None:
     for name in ("unknown_plane_q_delta", "unknown_plane_abs_delta", "unknown_moment_w_delta"):
         alone = gain(fitter, parent, name, [], is_thorough=True)
         assert together[name] == pytest.approx(alone - charge, abs=1e-3)
+
+
+def test_the_likeliest_forms_bring_that_of_the_plane_with_them() -> None:
+    gains = {"unknown_force_w_w": 40.0, "unknown_moment_w_delta": 90.0, "unknown_plane_w_delta": 70.0}
+    most, of_plane, least = "unknown_moment_w_delta", "unknown_plane_w_delta", "unknown_force_w_w"
+    assert likely_forms(gains, least=6.0, count=1) == [most, of_plane]
+    assert likely_forms(gains, least=6.0, count=3) == [most, of_plane, least]
+    assert likely_forms(gains, least=80.0, count=3) == [most, of_plane]
+    assert likely_forms({most: 90.0}, least=80.0) == [most]
+    assert likely_forms(gains, least=100.0) == []
+
+
+def test_a_form_that_hardly_betters_what_is_known_is_no_lone_one() -> None:
+    def drag(_: float, x: np.ndarray, __: float) -> tuple[float, float, float]:  # type: ignore[type-arg]
+        return -3.0 * abs(x[0]) * x[0], 0.0, 0.0
+
+    fitter = Fitter([hidden_dive(drag, duration=60.0)])
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        drag_alone = search.remember(fitter.grown(fitter.root, "heave_quadratic_drag", []))
+        assert fitter.excess(fitter.root.fit) > 1.15 > fitter.excess(drag_alone.fit)
+        assert lone_form(search, drag_alone) is None
+        assert not any(names & UNKNOWN.keys() for names in search.tried)
 
 
 def test_a_plane_that_bites_better_to_one_side_is_told_by_its_force_and_moment_together() -> None:
