@@ -1,6 +1,7 @@
 """From judged recordings to figures, tables and the page."""
 
 import json
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
@@ -38,6 +39,7 @@ def test_score_counts_each_question_over_its_own_cases() -> None:
     assert found["nothing hidden: something named"] == (0, 1)
     assert found["outside physics: unexplained or partly explained"] == (1, 1)
     assert found["slot located right"] == (2, 4)
+    assert found["no longer than 300 s at 10 Hz: diagnosed in 60 s, on one core"] == (6, 6)
     assert found["95 % intervals of effects hold the truth"] == (1, 1)
     assert found["one hidden, misfit 300-2000: named first"] == (1, 3)
     assert result.failed == ["dive_0006"]
@@ -60,6 +62,13 @@ def test_what_the_search_missed_is_told_from_ties(bic: float, missed: int) -> No
 def test_a_failure_with_nothing_hidden_is_not_silence() -> None:
     result = score([judge(answer("none", ()), recorded(), None)])
     assert rates(result)["nothing hidden: something named"] == (1, 1)
+
+
+def test_only_recordings_of_ordinary_length_are_timed() -> None:
+    one = five()[0]
+    judged = [replace(one, rows=rows, seconds=s) for rows, s in ((3000, 60.0), (3000, 61.0), (3001, 9.0))]
+    name = "no longer than 300 s at 10 Hz: diagnosed in 60 s, on one core"
+    assert rates(score(judged))[name] == (1, 2)
 
 
 def test_bars_and_intervals_of_rates() -> None:

@@ -74,6 +74,7 @@ class Judged:
     truth_lead: float | None = None
     effect_coefficients: list[Coefficient] = field(default_factory=list)
     base_coefficients: list[Coefficient] = field(default_factory=list)
+    rows: int = 0
     seconds: float = 0.0
     memory_mb: float = 0.0
 
@@ -143,6 +144,7 @@ def judge(
         truth_lead=0.0 if is_exact else _truth_lead(answer, diagnosis, true_heldout),
         effect_coefficients=_effect_coefficients(answer, effects) if is_exact else [],
         base_coefficients=_base_coefficients(answer, model) if is_exact else [],
+        rows=len(recorded["time_s"]),
         seconds=seconds,
         memory_mb=memory_mb,
     )

@@ -11,6 +11,7 @@ from tools.trial.judge import NOTHING, Coefficient, Judged
 
 NEGLIGIBLE = 0.1  # of BIC: two fits of one set
 MISSED = 6.0  # of BIC, that a name must be worth
+USUAL_ROWS, PROMPT = 3000, 60.0  # 300 s at 10 Hz, and within how many s they are to be diagnosed
 BANDS = ((50.0, 300.0), (300.0, 2000.0), (2000.0, 20000.0))  # of misfit; weaker effects are harder to name
 
 
@@ -103,6 +104,11 @@ def score(judged: list[Judged]) -> Score:
         _rate("held-out error <= 1.05 x noise, rightly named", exact, lambda j: _within(j.over_floor, 1.05)),
         _rate("95 % intervals of effects hold the truth", effect, lambda c: c.is_covered, 0.93, 0.97),
         _rate("95 % intervals of a1 ... u0 hold the truth", base, lambda c: c.is_covered, 0.93, 0.97),
+        _rate(
+            "no longer than 300 s at 10 Hz: diagnosed in 60 s, on one core",
+            [j for j in judged if j.rows <= USUAL_ROWS],
+            lambda j: j.seconds <= PROMPT,
+        ),
     ]
     bands = [
         _rate(
