@@ -40,6 +40,13 @@ def test_remaining_of_a_run_that_fails_is_endless() -> None:
     assert remaining(lambda sets: np.full((len(sets), 4), np.inf), np.zeros(2), np.ones(2)) == np.inf
 
 
+def test_beside_runs_that_fail_it_stays_where_it_is() -> None:
+    def model(sets: np.ndarray) -> np.ndarray:
+        return np.where(sets > 1.0, np.inf, 3.0) * np.ones(4)
+
+    assert remaining(model, np.array([1.0]), np.array([1e-3])) == 36.0
+
+
 @pytest.mark.parametrize(
     ("name", "coefficient"),
     [

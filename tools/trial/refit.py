@@ -35,6 +35,8 @@ def remaining(
     learnt = False
     slopes = _slopes(model, best, residual, steps)
     for _ in range(most_iterations):
+        if not np.isfinite(slopes).all():
+            break  # beside a run that fails there is nowhere to go
         scale = np.sqrt(np.sum(slopes**2, axis=1)) + 1e-12
         scaled = slopes / scale[:, None]
         before = cost
@@ -62,4 +64,5 @@ def remaining(
 
 
 def _slopes(model: Model, at: Array, residual: Array, steps: Array) -> Array:
+    """(coefficients, rows)."""
     return (model(at + np.diag(steps)) - residual) / steps[:, None]
