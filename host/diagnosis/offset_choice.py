@@ -8,12 +8,15 @@ from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, ROUGH, margin
 from host.diagnosis.trims import retrimmed
+from host.diagnosis.workers import Task
 
 if TYPE_CHECKING:
     from host.diagnosis.search import Search
 
 LEADING = 8  # sets with a free trim that are looked at
 CONTENDERS = 3  # of them, for the first place
+BENT_BY_A_ZERO = ("speed_loss", "actuator_saturation", "rudder_stall", "rudder_effectiveness_change")
+"""What depends on the plane's angle as no constant force and moment do."""
 
 
 def with_best_offsets(search: "Search") -> Explanation:
@@ -45,9 +48,13 @@ def with_best_offsets(search: "Search") -> Explanation:
 def with_offset(search: "Search", beam: list[Explanation]) -> list[Explanation]:
     """The beam, before it the best of its sets with an offset, if that explains more than the free trim.
 
-    At a speed that changes no constant force does what a bias of the pitch sensor or a current does.
+    At a speed that changes no constant force does what a bias of the pitch sensor or a current does, and none
+    what a zero error of the plane does to all that depends on its angle.
     """
-    tasks = [(retrimmed, (e, frozenset({name}))) for e in beam for name in OFFSETS]
+    zero = search.remember(search.fitter.grown(search.base, "rudder_offset", []))
+    tasks: list[Task] = [(retrimmed, (e, frozenset({name}))) for e in beam for name in OFFSETS]
+    candidates = {effect.name for effect in search.fitter.candidates}
+    tasks += [search.growth(zero, name) for name in BENT_BY_A_ZERO if name in candidates]
     best = min((search.remember(e) for e in search.workers.results(tasks)), key=lambda e: e.bic)
     return [best, *beam] if best.bic < beam[0].bic - margin(beam[0]) else beam
 

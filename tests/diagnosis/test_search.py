@@ -12,6 +12,7 @@ from host.diagnosis.charges import LONELY, RARITY
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import LITTLE
+from host.diagnosis.offset_choice import with_offset
 from host.diagnosis.pruning import leanest, pruned
 from host.diagnosis.search import Search
 from host.diagnosis.together import completed, together, with_ordinary
@@ -161,3 +162,18 @@ def test_an_offset_joins_a_speed_that_changes_and_what_it_leaves_is_nothing(
     assert said.pop() == "settling"
     assert said  # what remains is tried beside both, and nothing beside less
     assert all(line.startswith("3 effects") and "pitch_bias + " in line for line in said)
+
+
+def test_a_zero_error_of_the_plane_is_tried_beside_what_depends_on_its_angle() -> None:
+    """A free trim cannot do its work there, so that beside it other effects may lead."""
+    hidden = frozenset({"rudder_offset", "speed_loss"})
+    values = {"rudder_zero": 0.07, "speed_time": 15.0, "c_ud": 6.0, "c_uq": 1.0}
+    fitter = Fitter([flown(values, hidden)])
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        others = [e for e in search.singles() if not e.names & hidden]
+        parents = sorted(others, key=lambda e: e.bic)[:2]
+        assert all(fitter.excess(parent.fit) > LITTLE for parent in parents)
+        leading = with_offset(search, parents)[0]
+    assert leading.names == hidden
+    assert fitter.excess(leading.fit) < LITTLE
