@@ -41,6 +41,7 @@ def lone_form(search: "Search", leading: Explanation) -> Explanation | None:
     alone = {name: search.tried.get(search.root.names | {name}) for name in ONE_SIDED}
     tasks += [search.growth(e, ONE_SIDED[name]) for name, e in alone.items() if e is not None]
     best = min([leading, *search.workers.results(tasks)], key=lambda e: e.bic)
+    # Of several entries that act at once two members leave little, too, but nothing white.
     return best if best.leaves_white and _is_enough(search, best, leading) else None
 
 

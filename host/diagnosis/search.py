@@ -84,7 +84,7 @@ class Search:
             if beam and beam[0].leaves_white and self.fitter.excess(beam[0].fit) < LITTLE:
                 del beam[1:]  # whatever grows from the others is not likelier
             if foreign is not None and (not beam or foreign.bic < beam[0].bic - margin(foreign)):
-                self.remember(foreign)
+                self.remember(foreign)  # no pair of the catalogue does as well
                 break
             if not beam or beam[0].bic > best_before - margin(beam[0]):
                 break

@@ -92,22 +92,13 @@ def _attempt(rng: np.random.Generator, number: int, card: Card, has_usual: bool)
         return None
     if not is_ordinary(voyage):
         return None
-    misfits = {}
     if len(acting) == 1:
         beyond = hidden[0].is_foreign
         misfits = {hidden[0].name: linear_misfit(voyage, outing, setting, noise, beyond)}
-    calm = tuple(effect for effect in acting if effect.name != "surface_waves")
-    heard = noise
-    if 0 < len(calm) < len(acting):
-        still = sail(outing.scenario, seed, calm, setting, voyage.command)
-        heard = noise.among_waves(voyage, still, outing.rate_hz)
-    for effect in hidden if len(acting) > 1 else ():
-        others = tuple(other for other in acting if other is not effect)
-        beside = heard if effect in calm else noise
-        misfit = misfit_beside(voyage, outing, seed, others, setting, beside, MISFIT)
-        if misfit < MISFIT:
-            return None
-        misfits[effect.name] = misfit
+    else:
+        misfits = _misfits_beside(voyage, outing, seed, hidden, usual, setting, noise)
+    if len(misfits) < len(hidden):
+        return None
     return _written(number, card, outing, seed, setting, noise, hidden, usual, voyage, misfits)
 
 
@@ -148,6 +139,33 @@ def _strong_enough(
         return None
     misfit = linear_misfit(voyage, outing, setting, noise, effect.is_foreign)
     return effect if misfit >= (FOREIGN_MISFIT if effect.is_foreign else MISFIT) else None
+
+
+def _misfits_beside(
+    voyage: Voyage,
+    outing: Outing,
+    seed: int,
+    hidden: tuple[Hidden, ...],
+    usual: tuple[Hidden, ...],
+    setting: Setting,
+    noise: Yardstick,
+) -> dict[str, float]:
+    """What each hidden effect leaves beside all else that acts, up to the first that cannot be seen."""
+    acting = (*hidden, *usual)
+    calm = tuple(effect for effect in acting if effect.name != "surface_waves")
+    among_waves = noise
+    if 0 < len(calm) < len(acting):
+        still = sail(outing.scenario, seed, calm, setting, voyage.command)
+        among_waves = noise.among_waves(voyage, still, outing.rate_hz)
+    misfits: dict[str, float] = {}
+    for effect in hidden:
+        others = tuple(other for other in acting if other is not effect)
+        told_from = among_waves if effect in calm else noise
+        misfit = misfit_beside(voyage, outing, seed, others, setting, told_from, MISFIT)
+        if misfit < MISFIT:
+            break
+        misfits[effect.name] = misfit
+    return misfits
 
 
 def _written(
