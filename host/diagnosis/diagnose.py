@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from host.catalogue import BY_NAME, UNKNOWN, named
+from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.deviations import deviations
 from host.diagnosis.exchange import twins
 from host.diagnosis.explanation import Explanation
@@ -188,7 +189,7 @@ def _explain(
     """Searches for the best explanation, or goes on from that of a part, where most has been settled."""
     known = None if part is None else part.search
     search = Search(fitter, workers, on_progress, fitter.base, fitter.root, known, way.alone)
-    best = search.run([] if part is None else [fitter.refitted(part.best)])
+    best = search.run([] if part is None else [fitter.refitted(one) for one in _found_in(part)])
     waves = way.waves if part is None else None
     left, told = leftover(fitter, best), None
     if best.names or not left.is_nothing:
@@ -208,6 +209,12 @@ def _explain(
     if told is None and (lean := leanest(search, best)) is not best:
         best, left = lean, leftover(fitter, lean)
     return Explained(best, search, left, told)
+
+
+def _found_in(part: Explained) -> list[Explanation]:
+    """What explains a part best; and with names alone: a form fitted to a part may run away on the whole."""
+    names_only = (e for e in part.search.tried.values() if not e.names & {FREE_TRIM.name, *UNKNOWN})
+    return [part.best, min(names_only, key=lambda e: e.bic)] if unknown_in(part.best) else [part.best]
 
 
 def _named(search: Search, best: Explanation, spans: Spans, floor: Array, after: Misfit) -> list[NamedEffect]:

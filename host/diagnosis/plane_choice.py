@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from host.catalogue.nuisance import FREE_TRIM
-from host.diagnosis.explanation import Explanation
+from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import NAMING_MARGIN
 from host.diagnosis.search import Search
@@ -72,14 +72,18 @@ def by_single_effects(found: list[Way], on_progress: Callable[[str], None], jobs
 def is_likelier(other: Way, search: Search, best: Explanation) -> bool:
     """Whether the recordings are explained clearly better with the plane the other way.
 
-    By the same set, or by another that came close: taken the wrong way, the plane is made up for by what is
-    not there, and what is there falls behind.
+    By the same set, by one less of its members, or by another that came close: taken the wrong way, the plane
+    is made up for by what is not there, and what is there falls behind.
     """
     fitter = Fitter(divide(other.recordings).teaching, known=best)
-    bare = ((e.names - {FREE_TRIM.name}, e) for e in sorted(search.tried.values(), key=lambda e: e.bic))
-    close = {best.names: best}
+    bare = [(e.names - {FREE_TRIM.name}, e) for e in sorted(search.tried.values(), key=lambda e: e.bic)]
+    close = {best.names: best} | {names: e for names, e in bare[::-1] if names in _leaner(best)}
     for names, explanation in bare:
         if len(close) < CONTENDERS:
             close.setdefault(names, explanation)
     least = best.bic - NAMING_MARGIN
     return any(fitter.reduced(explanation, names).bic < least for names, explanation in close.items())
+
+
+def _leaner(explanation: Explanation) -> list[Names]:
+    return [explanation.names - {name} for name in explanation.names]

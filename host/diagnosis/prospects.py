@@ -30,9 +30,12 @@ SLIGHT = 1e-9  # damping of a step that is as good as full
 def gain(fitter: "Fitter", parent: Explanation, name: str, values: list[Array], is_thorough: bool) -> float:
     """Twice the log-likelihood an effect could gain on top of the parent: one Gauss-Newton step ahead.
 
-    From `values` alone, or where these are none or it is to be thorough, from its own probes, too.
+    From `values` alone, or where these are none or it is to be thorough, from its own probes, too. So always
+    of the plane, whose limits, play and lag show only near their own size: alone they took on that of others.
     """
-    return max(ahead for ahead, _ in probed(fitter, parent, named(name), values, is_thorough or not values))
+    effect = named(name)
+    is_thorough |= not values or effect.slot == "actuator"
+    return max(ahead for ahead, _ in probed(fitter, parent, effect, values, is_thorough))
 
 
 def form_gains(fitter: "Fitter", parent: Explanation) -> dict[str, float]:
