@@ -13,7 +13,7 @@ JUDGING_SHARE = 0.1  # of a recording, in each of two spans
 ALARM_LATE = 90.0  # s, by which an alarm may come after what it tells of
 LONGEST_RUN = 600.0  # s; a teaching run starts anew after so long, or the smallest drift would rule it
 LONG = 15000  # rows of all teaching runs, beyond which a search begins with an excerpt
-EXCERPT = 4000  # rows
+EXCERPT, PIECE = 4000, 2000  # rows of an excerpt, and at least of each of its pieces
 LEAST_MEASURED = 20  # values of each channel, for a span to be of use
 
 
@@ -60,17 +60,22 @@ def divide(recordings: list[Recording]) -> Spans:
 
 
 def excerpt(teaching: list[Recording]) -> list[Recording]:
-    """Of long recordings a piece of each run, the one in which the plane moves most; else all."""
-    rows = sum(run.time.size for run in teaching)
-    if rows <= LONG:
+    """Of long recordings the pieces in which the plane moves most; else all.
+
+    Few and long ones: each adds a start that is to be found, and what acts late shows only in the rest.
+    """
+    if sum(run.time.size for run in teaching) <= LONG:
         return teaching
-    count = int(np.ceil(rows / EXCERPT))
-    pieces = []
-    for run in teaching:
-        edges = np.linspace(run.time[0], run.time[-1] + run.step, count + 1)
-        parts = [run.between(float(start), float(end)) for start, end in pairwise(edges)]
-        pieces.append(max(parts, key=lambda part: float(np.std(part.rudder)) * _is_measured(part)))
-    return pieces
+    parts = [part for run in teaching for part in _pieces(run)]
+    ordered = np.argsort([-float(np.std(part.rudder)) * _is_measured(part) for part in parts])
+    rows = np.cumsum([parts[k].time.size for k in ordered])
+    chosen = ordered[: 1 + int(np.searchsorted(rows, EXCERPT))]
+    return [parts[k] for k in sorted(chosen)]
+
+
+def _pieces(run: Recording) -> list[Recording]:
+    edges = np.linspace(run.time[0], run.time[-1] + run.step, 1 + max(1, run.time.size // PIECE))
+    return [run.between(float(start), float(end)) for start, end in pairwise(edges)]
 
 
 def _set_aside(recording: Recording) -> list[tuple[float, float]]:

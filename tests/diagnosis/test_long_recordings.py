@@ -19,21 +19,35 @@ def test_what_is_short_is_its_own_excerpt() -> None:
     assert spans.excerpt(teaching) is teaching
 
 
-def test_an_excerpt_has_a_piece_of_each_run_where_the_plane_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_excerpt_is_of_the_pieces_where_the_plane_moves_most(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spans, "LONG", 1500)
     monkeypatch.setattr(spans, "EXCERPT", 600)
+    monkeypatch.setattr(spans, "PIECE", 300)
     first, second = hidden_dive(duration=90.0), hidden_dive(duration=90.0, seed=1)
     first.rudder[:550] = 0.0
+    second.rudder[310:] *= 0.1
     pieces = spans.excerpt([first, second])
     assert [piece.time.size for piece in pieces] == [300, 300]
-    assert pieces[0].time[0] == pytest.approx(60.0, abs=0.2)  # the time is still that of the recording
+    assert [piece.time[0] for piece in pieces] == pytest.approx([60.0, 0.0], abs=0.2)  # as in the recordings
     at = np.searchsorted(first.time, pieces[0].time)
     np.testing.assert_array_equal(pieces[0].depth, first.depth[at])
+
+
+def test_what_is_not_measured_comes_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spans, "LONG", 500)
+    monkeypatch.setattr(spans, "EXCERPT", 300)
+    monkeypatch.setattr(spans, "PIECE", 300)
+    dive = hidden_dive(duration=90.0)
+    dive.rudder[300:] *= 0.1
+    dive.depth[:300] = np.nan
+    (piece,) = spans.excerpt([dive])
+    assert piece.time[0] >= 30.0 - 1e-6
 
 
 def test_a_long_recording_is_diagnosed_from_its_excerpt(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spans, "LONG", 1500)
     monkeypatch.setattr(spans, "EXCERPT", 800)
+    monkeypatch.setattr(spans, "PIECE", 400)
     said: list[str] = []
     found = diagnose([hidden_dive(_coupled, duration=240.0)], said.append)
     assert said.index("an excerpt") < said.index("the whole")
