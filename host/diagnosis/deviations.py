@@ -13,6 +13,7 @@ import numpy as np
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.prospects import whitened_at
+from host.diagnosis.workers import Task, Workers
 from host.equations import Effect
 from host.gauss_newton import GaussNewton, Point
 from host.output_error import output_error
@@ -28,7 +29,7 @@ NEARLY_FALLEN = 0.95  # of what the log-likelihood is to fall by
 FEW_ITERATIONS, TOLERANCE = 10, 0.005
 
 
-def deviations(fitter: Fitter, explanation: Explanation) -> dict[str, float]:
+def deviations(fitter: Fitter, explanation: Explanation, workers: Workers | None = None) -> dict[str, float]:
     """Standard deviations of all coefficients by name.
 
     A moment drawn anywhere in the recording would deviate by duration / sqrt(12), one drawn between two rows,
@@ -43,7 +44,8 @@ def deviations(fitter: Fitter, explanation: Explanation) -> dict[str, float]:
     most = max(recording.duration for recording in fitter.recordings) / np.sqrt(12.0)
     free = {name for name, is_free in zip(structure.names, explanation.fit.free, strict=True) if is_free}
     if not explanation.fit.has_process_noise:
-        std |= _profiled(fitter, explanation, {name: std[name] for name in free - structure.moments})
+        workers = workers or Workers(fitter, 1)
+        std |= _profiled(workers, explanation, {name: std[name] for name in free - structure.moments})
     for name in structure.moments & free:
         reach = max(_reach(fitter, explanation, name, side) for side in (-1.0, 1.0))
         std[name] = float(np.clip(reach / HALF_WIDTH, least, most))
@@ -57,22 +59,24 @@ def interval(effect: Effect, name: str, value: float, std: float) -> tuple[float
     return float(low), float(high)
 
 
-def _profiled(fitter: Fitter, explanation: Explanation, std: dict[str, float]) -> dict[str, float]:
+def _profiled(workers: Workers, explanation: Explanation, std: dict[str, float]) -> dict[str, float]:
     """The deviations, or larger ones where a profile of the likelihood is flatter than its curvature says."""
-    fit, found = explanation.fit, {}
+    fit, lean, tasks = explanation.fit, explanation.lean(), list[Task]()
     free = np.flatnonzero(fit.free)
     white = np.zeros((fit.free.size, fit.free.size))
     white[np.ix_(free, free)] = safe_inverse(fit.information[np.ix_(free, free)])
+    told = []
     for name, known in std.items():
         k = fit.structure.names.index(name)
-        found[name] = known
         bounds = fit.structure.parameters[k]
         if white[k, k] < (bounds.upper - bounds.lower) ** 2 / 12.0:  # else the recording tells nothing of it
             ahead = white[:, k] / white[k, k]
             limit = (HALF_WIDTH * known) ** 2 / white[k, k]
-            sides = (_distance(fitter, explanation, k, side * ahead, known, limit) for side in (-1.0, 1.0))
-            found[name] = max(known, *(distance / HALF_WIDTH for distance in sides))
-    return found
+            told.append(name)
+            tasks += [(_distance, (lean, k, side * ahead, known, limit)) for side in (-1.0, 1.0)]
+    distances = np.reshape(workers.results(tasks), (-1, 2))
+    farthest = {name: max(pair) / HALF_WIDTH for name, pair in zip(told, distances, strict=True)}
+    return {name: max(known, farthest.get(name, 0.0)) for name, known in std.items()}
 
 
 def _distance(

@@ -108,31 +108,34 @@ def diagnose(
 def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], jobs: int) -> Diagnosis:
     """The diagnosis with the plane taken so, unless what is found speaks for another way."""
     recordings, fitter = way.recordings, way.fitter
-    floor = noise_floor(recordings)
-    spans = divide(recordings)
-    part = None
-    if excerpt(spans.teaching) is not spans.teaching:
+    floor, spans = noise_floor(recordings), divide(recordings)
+    is_part = excerpt(spans.teaching) is not spans.teaching
+    if is_part:
         on_progress("an excerpt")
-        with Workers(fitter, jobs) as workers:
-            part = _explain(fitter, workers, on_progress, way)
-        on_progress("the whole")
-        fitter = Fitter(spans.teaching)
     with Workers(fitter, jobs) as workers:
-        explained = _explain(fitter, workers, on_progress, way, part)
+        explained = _explain(fitter, workers, on_progress, way)
         again = next(
             (other for other in others if is_likelier(other, explained.search, explained.best)), None
         )
-        if again is None:
+        if again is None and not is_part:
             judged = _judge(explained, spans, floor, on_progress)
     if again is not None:
         on_progress("the plane between rows")
         return _diagnosed(again, [], on_progress, jobs)
+    if is_part:
+        on_progress("the whole")
+        fitter = Fitter(spans.teaching)
+        with Workers(fitter, jobs) as workers:
+            explained = _explain(fitter, workers, on_progress, way, explained)
+            judged = _judge(explained, spans, floor, on_progress)
     best, search, left, waves = explained
     on_progress("final fit on everything")
     base = _refitted(search.base, recordings)
     found = extended = _refitted(best if waves is None else waves.fitted, recordings)
     whole = Fitter(recordings, known=found)
-    std = deviations(whole, found)
+    # Of a short recording they take less time than new processes.
+    with Workers(whole, jobs if is_part else 1) as workers:
+        std = deviations(whole, found, workers)
     if waves is not None:
         extended = with_regular_waves(whole, found)
         std = deviations(whole, extended) | std

@@ -42,7 +42,9 @@ def ways(recordings: list[Recording]) -> list[Way]:
     moving = [with_moving_plane(recording) for recording in recordings]
     is_same = all(np.array_equal(a.rudder, b.rudder) for a, b in zip(recordings, moving, strict=True))
     tried = [recordings] if is_same else [recordings, moving]
-    fitted = [Way(each, Fitter(excerpt(divide(each).teaching))) for each in tried]
+    teaching = [divide(each).teaching for each in tried]
+    parts = [excerpt(runs, like=teaching[0]) for runs in teaching]
+    fitted = [Way(each, Fitter(part)) for each, part in zip(tried, parts, strict=True)]
     fitted.sort(key=lambda way: way.fitter.base.bic)
     leading, *rest = fitted
     if (waves := plain_waves(leading.fitter)) is None:
@@ -70,12 +72,12 @@ def by_single_effects(found: list[Way], on_progress: Callable[[str], None], jobs
 
 
 def is_likelier(other: Way, search: Search, best: Explanation) -> bool:
-    """Whether the recordings are explained clearly better with the plane the other way.
+    """Whether what was searched is explained clearly better with the plane the other way.
 
     By the same set, by one less of its members, or by another that came close: taken the wrong way, the plane
     is made up for by what is not there, and what is there falls behind.
     """
-    fitter = Fitter(divide(other.recordings).teaching, known=best)
+    fitter = Fitter(other.fitter.recordings, known=best)
     bare = [(e.names - {FREE_TRIM.name}, e) for e in sorted(search.tried.values(), key=lambda e: e.bic)]
     close = {best.names: best} | {names: e for names, e in bare[::-1] if names in _leaner(best)}
     for names, explanation in bare:

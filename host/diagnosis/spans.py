@@ -59,15 +59,17 @@ def divide(recordings: list[Recording]) -> Spans:
     return Spans(teaching, judging, unseen if judging else [])
 
 
-def excerpt(teaching: list[Recording]) -> list[Recording]:
+def excerpt(teaching: list[Recording], like: list[Recording] | None = None) -> list[Recording]:
     """Of long recordings the pieces in which the plane moves most; else all.
 
     Few and long ones: each adds a start that is to be found, and what acts late shows only in the rest.
+
+    like  the same recordings with another plane, by which the pieces are chosen
     """
     if sum(run.time.size for run in teaching) <= LONG:
         return teaching
-    parts = [part for run in teaching for part in _pieces(run)]
-    ordered = np.argsort([-float(np.std(part.rudder)) * _is_measured(part) for part in parts])
+    parts, judged = ([part for run in runs for part in _pieces(run)] for runs in (teaching, like or teaching))
+    ordered = np.argsort([-float(np.std(part.rudder)) * _is_measured(part) for part in judged])
     rows = np.cumsum([parts[k].time.size for k in ordered])
     chosen = ordered[: 1 + int(np.searchsorted(rows, EXCERPT))]
     return [parts[k] for k in sorted(chosen)]
