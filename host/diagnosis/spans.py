@@ -12,7 +12,7 @@ SHORTEST_SPAN = 8.0  # s; a free run over less says little
 JUDGING_SHARE = 0.1  # of a recording, in each of two spans
 ALARM_LATE = 90.0  # s, by which an alarm may come after what it tells of
 LONGEST_RUN = 600.0  # s; a teaching run starts anew after so long, or the smallest drift would rule it
-LONG = 15000  # rows of all teaching runs, beyond which a search begins with an excerpt
+LONG = 8000  # rows of all teaching runs, beyond which a search begins with an excerpt
 EXCERPT, PIECE = 4000, 2000  # rows of an excerpt, and at least of each of its pieces
 LEAST_MEASURED = 20  # values of each channel, for a span to be of use
 

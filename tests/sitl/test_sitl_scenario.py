@@ -24,7 +24,7 @@ def test_shipped_scenario_loads_under_its_own_name(name):
 
 
 def test_shipped_scenarios_are_the_documented_ones():
-    assert SHIPPED == ["default", "fin_damage", "fin_lost", "linear_noise_free", "rough_sea"]
+    assert SHIPPED == ["calm_sea", "default", "fin_damage", "fin_lost", "linear_noise_free", "rough_sea"]
 
 
 def test_realistic_flavour_is_a_start_that_the_file_may_change():
@@ -85,7 +85,7 @@ def test_slip_is_answered_in_one_line(text, says):
 
 
 def test_missing_file_names_the_shipped_ones():
-    with pytest.raises(ScenarioError, match=r"no_such cannot be read: .*; shipped ones: default, fin_damage"):
+    with pytest.raises(ScenarioError, match=r"no_such cannot be read: .*; shipped ones: calm_sea, default"):
         load("no_such")
 
 
