@@ -205,8 +205,9 @@ def sentences(found: Comparison, given: str) -> list[str]:
         title = effect.name.replace("_", " ")
         unit = {p.name: p.unit for p in named(effect.name).parameters}
         if effect.status == "missing":
-            listed = ", ".join(_said(k, v, s, unit[k]) for k, (v, s) in effect.recorded.items())
-            said.append(f"{title} is missing from the {given}: {listed}.")
+            # What has no deviation was held: of a speed that was measured there is nothing to estimate.
+            listed = ", ".join(_said(k, v, s, unit[k]) for k, (v, s) in effect.recorded.items() if s > 0.0)
+            said.append(f"{title} is missing from the {given}{': ' * bool(listed)}{listed}.")
         elif effect.status == "superfluous":
             listed = ", ".join(_said(k, v, s, unit[k]) for k, (v, s) in effect.given.items())
             said.append(f"{title} is too much in the {given} ({listed}): the recording shows none of it.")

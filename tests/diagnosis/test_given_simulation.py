@@ -10,6 +10,7 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.diagnosis.answer import Answer
+from host.diagnosis.comparison import Comparison, EffectDifference, sentences
 from host.diagnosis.diagnose import Diagnosis
 from host.diagnosis.files import document
 from host.diagnosis.given_simulation import against_simulation, check_same_flight
@@ -55,6 +56,14 @@ def test_the_answer_in_the_file(answer: Answer) -> None:
     status = {effect["name"]: effect["status"] for effect in simulation["effects"]}
     assert status == {"heave_pitch_rate_coupling": "missing", "heave_quadratic_drag": "superfluous"}
     assert any("is missing from the simulation" in sentence for sentence in simulation["sentences"])
+
+
+def test_of_what_was_measured_no_coefficient_is_told() -> None:
+    missing = EffectDifference(
+        name="speed_loss", status="missing", recorded={"c_ud": (0.0, 0.0)}, given={}, evidence=99.0
+    )
+    (said,) = sentences(Comparison(effects=[missing], parameters=[]), "simulation")
+    assert said == "speed loss is missing from the simulation."
 
 
 def test_a_weaker_effect_in_the_simulation_is_no_missing_one(coupled: Diagnosis) -> None:

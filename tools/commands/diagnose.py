@@ -100,11 +100,13 @@ def run(args: argparse.Namespace) -> int:
     for effect in found.effects:
         twins = f"  (or {', '.join(map(title, effect.twins))})" if effect.twins else ""
         print(f"  {effect.name}{twins}")
-        for name, (value, std, unit) in effect.coefficients.items():
-            if std > 0.0:  # else it was measured, not estimated
-                low, high = interval(named(effect.name), name, value, std)
-                unit = "" if unit == "1" else f" {unit}"
-                print(f"    {name:24s} {value:+.5g}{unit}  (95 %: {low:+.5g} to {high:+.5g})")
+        estimated = {name: one for name, one in effect.coefficients.items() if one[1] > 0.0}
+        if not estimated:
+            print(f"    {named(effect.name).sentence} All of it was measured.")
+        for name, (value, std, unit) in estimated.items():
+            low, high = interval(named(effect.name), name, value, std)
+            unit = "" if unit == "1" else f" {unit}"
+            print(f"    {name:24s} {value:+.5g}{unit}  (95 %: {low:+.5g} to {high:+.5g})")
         for separation in answer.separating(effect.name):
             print(f"    {separation.sentence}")
     print(f"  {found.remaining}")
