@@ -114,9 +114,7 @@ def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], 
         on_progress("an excerpt")
     with Workers(fitter, jobs) as workers:
         explained = _explain(fitter, workers, on_progress, way)
-        again = next(
-            (other for other in others if is_likelier(other, explained.search, explained.best)), None
-        )
+        again = next((other for other in others if _is_likelier(other, explained)), None)
         if again is None and not is_part:
             judged = _judge(explained, spans, floor, on_progress)
     if again is not None:
@@ -163,6 +161,11 @@ def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], 
         bic=best.bic,
         std=std,
     )
+
+
+def _is_likelier(other: Way, explained: Explained) -> bool:
+    in_own_waves = None if explained.waves is None else explained.waves.fitted
+    return is_likelier(other, explained.search, explained.best, in_own_waves)
 
 
 def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callable[[str], None]) -> Judged:

@@ -10,6 +10,7 @@ from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import NAMING_MARGIN
+from host.diagnosis.sea_fits import with_waves
 from host.diagnosis.search import Search
 from host.diagnosis.seas import plain_waves
 from host.diagnosis.spans import divide, excerpt
@@ -71,13 +72,21 @@ def by_single_effects(found: list[Way], on_progress: Callable[[str], None], jobs
     return [other, leading] if min(there) < least else [leading, other]
 
 
-def is_likelier(other: Way, search: Search, best: Explanation) -> bool:
+def is_likelier(
+    other: Way, search: Search, best: Explanation, in_own_waves: Explanation | None = None
+) -> bool:
     """Whether what was searched is explained clearly better with the plane the other way.
 
     By the same set, by one less of its members, or by another that came close: taken the wrong way, the plane
     is made up for by what is not there, and what is there falls behind.
+
+    in_own_waves  the best set among waves that were estimated beside it, if any: the search compared sets in
+                  waves as they were first found, from which others may part for better ones
     """
     fitter = Fitter(other.fitter.recordings, known=best)
+    if in_own_waves is not None:
+        sets = [in_own_waves, *(fitter.reduced(in_own_waves, names) for names in _leaner(in_own_waves))]
+        return min(with_waves(fitter, one).bic for one in sets) < in_own_waves.bic - NAMING_MARGIN
     bare = [(e.names - {FREE_TRIM.name}, e) for e in sorted(search.tried.values(), key=lambda e: e.bic)]
     close = {best.names: best} | {names: e for names, e in bare[::-1] if names in _leaner(best)}
     for names, explanation in bare:

@@ -14,6 +14,7 @@ from host.diagnosis.diagnose import diagnose
 from host.diagnosis.files import write_extended_model
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.plane_choice import by_single_effects, is_likelier, ways
+from host.diagnosis.sea_fits import with_waves
 from host.diagnosis.search import Search
 from host.diagnosis.workers import Workers
 from host.equations import NAMES
@@ -34,9 +35,10 @@ def plane(time: float | Array) -> Array:
     return np.asarray(0.12 * np.sin(1.7 * time) + 0.1 * np.sin(0.7 * time + 1.0))
 
 
-def dive(way: Way) -> Recording:
-    """The paper's vehicle with a plane that swings, read off every 0.1 s."""
+def dive(way: Way, *, carried: float = 0.0) -> Recording:
+    """The paper's vehicle with a plane that swings, read off every 0.1 s; waves carry it, m/s each."""
     rng, time = np.random.default_rng(2), np.arange(600) * STEP
+    met, phase = np.linspace(0.9, 1.5, 12), rng.uniform(0.0, 2.0 * np.pi, 12)  # rad/s
 
     def rate(t: float, x: Array) -> list[float]:
         w, q, theta, _ = x
@@ -45,7 +47,7 @@ def dive(way: Way) -> Recording:
             BASE["a1"] * w + BASE["b1"] * angle,
             BASE["a2"] * q + BASE["a3"] * theta + BASE["b2"] * angle,
             q,
-            w - BASE["u0"] * theta,
+            w - BASE["u0"] * theta + carried * float(np.sin(met * t + phase).sum()),
         ]
 
     start = [0.0, 0.0, 0.0, 20.0]
@@ -86,6 +88,16 @@ def test_what_the_plane_did_is_read_off_the_motion(way: Way) -> None:
     assert (NOTE in first.recordings[0].notes) == (way == "moving")
     assert is_likelier(first, searched(second.fitter), second.fitter.base)
     assert not is_likelier(second, searched(first.fitter), first.fitter.base)
+
+
+def test_among_waves_the_other_way_is_asked_with_waves_of_its_own() -> None:
+    first, second = ways([dive("moving", carried=0.02)])
+    assert first.waves is not None
+    assert second.waves is not None
+    assert NOTE in first.recordings[0].notes
+    held, moving = (with_waves(way.fitter, way.fitter.base) for way in (second, first))
+    assert is_likelier(first, searched(second.fitter), second.fitter.base, held)
+    assert not is_likelier(second, searched(first.fitter), first.fitter.base, moving)
 
 
 def test_a_set_that_came_close_may_speak_for_the_other_way() -> None:
