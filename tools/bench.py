@@ -1,5 +1,6 @@
 """What the bench commands share: the vehicle file, the recordings, progress, and a word about the extra."""
 
+import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ from host.vehicle import Vehicle, default_vehicle, read_vehicle
 if TYPE_CHECKING:
     from host.recording import Recording
 
+COUNT = re.compile(r",? \d+/\d+\b")  # "2 effects, 3/20: ..."
 BENCH_MODULES = ("scipy", "casadi", "matplotlib", "jinja2", "rich")
 
 
@@ -74,7 +76,7 @@ def tell_notes(recordings: "list[Recording]") -> None:
 
 @contextmanager
 def progress(quiet: bool) -> "Iterator[Callable[[str], None]]":
-    """A spinner on a terminal, a line per stage on a pipe, nothing when quiet."""
+    """A spinner on a terminal, a line per stage (whatever it counts) on a pipe, nothing when quiet."""
     if quiet:
         yield lambda _: None
     elif sys.stderr.isatty():
@@ -84,4 +86,13 @@ def progress(quiet: bool) -> "Iterator[Callable[[str], None]]":
         with console.status("") as status:
             yield status.update
     else:
-        yield lambda stage: print(stage, file=sys.stderr, flush=True)
+        said = ""
+
+        def say(text: str) -> None:
+            nonlocal said
+            stage = COUNT.split(text)[0]
+            if stage != said:
+                print(stage, file=sys.stderr, flush=True)
+            said = stage
+
+        yield say

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tools.bench import progress
 from tools.cli import main
 
 COLUMNS = ("time_s", "depth_m", "pitch_rad", "rudder_rad")
@@ -159,3 +160,13 @@ def test_unknown_command_and_option_end_with_2(capsys: pytest.CaptureFixture[str
             main(arguments)
         assert caught.value.code == 2
         assert capsys.readouterr().err.startswith("mils")
+
+
+def test_on_a_pipe_progress_is_a_line_a_stage(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress(quiet=False) as say:
+        for text in ("reading 1.csv", "1 effect, 1/2: drag", "1 effect, 2/2: lag", "2 effects, 1/1: all"):
+            say(text)
+    assert capsys.readouterr().err.splitlines() == ["reading 1.csv", "1 effect", "2 effects"]
+    with progress(quiet=True) as say:
+        say("reading 1.csv")
+    assert capsys.readouterr().err == ""
