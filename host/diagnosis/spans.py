@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from math import inf
 
 import numpy as np
 
@@ -54,8 +55,8 @@ def divide(recordings: list[Recording]) -> Spans:
                 kept = _blanked(kept, start, end)
         for run, whole in zip(_runs(kept), _runs(recording), strict=True):
             if _is_measured(run):
-                teaching.append(run)
-                unseen.append(_less(whole, run))
+                teaching.append(_begun(run))
+                unseen.append(_less(whole.between(teaching[-1].time[0], inf), teaching[-1]))
     return Spans(teaching, judging, unseen if judging else [])
 
 
@@ -77,7 +78,13 @@ def excerpt(teaching: list[Recording], like: list[Recording] | None = None) -> l
 
 def _pieces(run: Recording) -> list[Recording]:
     edges = np.linspace(run.time[0], run.time[-1] + run.step, 1 + max(1, run.time.size // PIECE))
-    return [run.between(float(start), float(end)) for start, end in pairwise(edges)]
+    return [_begun(run.between(float(start), float(end))) for start, end in pairwise(edges)]
+
+
+def _begun(run: Recording) -> Recording:
+    """The run from where the first value is measured: nothing would tell the state long before it."""
+    measured = np.isfinite(run.depth) | np.isfinite(run.pitch)
+    return run.between(float(run.time[np.argmax(measured)]), inf)
 
 
 def _set_aside(recording: Recording) -> list[tuple[float, float]]:

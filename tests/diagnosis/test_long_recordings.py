@@ -44,6 +44,28 @@ def test_what_is_not_measured_comes_last(monkeypatch: pytest.MonkeyPatch) -> Non
     assert piece.time[0] >= 30.0 - 1e-6
 
 
+def test_what_teaches_begins_where_something_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spans, "LONG", 500)
+    monkeypatch.setattr(spans, "EXCERPT", 400)
+    monkeypatch.setattr(spans, "PIECE", 300)
+    dive = hidden_dive(duration=90.0)
+    dive.depth[:340], dive.pitch[:360] = np.nan, np.nan
+    first, second = spans.excerpt([dive])
+    assert [first.time[0], second.time[0]] == pytest.approx([34.0, 60.0], abs=0.2)
+    assert np.isfinite(first.depth[0])
+
+
+def test_a_run_that_begins_while_another_judges_begins_after(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spans, "LONGEST_RUN", 30.0)  # s, of 90: the first span judges from 22.5 to 31.5 s
+    dive = hidden_dive(duration=90.0)
+    divided = spans.divide([dive])
+    assert [run.time[0] for run in divided.teaching] == pytest.approx([0.0, 31.5, 60.0], abs=0.2)
+    for run, unseen in zip(divided.teaching, divided.unseen, strict=True):
+        np.testing.assert_array_equal(unseen.time, run.time)
+        assert np.isfinite(run.depth[0])
+        assert not (np.isfinite(run.depth) & np.isfinite(unseen.depth)).any()
+
+
 def test_a_long_recording_is_diagnosed_from_its_excerpt(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spans, "LONG", 1500)
     monkeypatch.setattr(spans, "EXCERPT", 800)
