@@ -186,6 +186,9 @@ AS_OF_PLANE = {
 }
 """Forms in heave or pitch alone, and those of the plane that do the same there."""
 
+WANDERING = frozenset(f"unknown_wandering_{kind}" for kind in KIND.values())
+"""Of so many terms in time that any slow motion can be followed with them."""
+
 FORMS: tuple[Effect, ...] = (
     *(_of_motion(side, shape, term) for side in SIDES for shape, term in SHAPES.items()),
     *(_of_plane(shape, term) for shape, term in PLANE_SHAPES.items()),

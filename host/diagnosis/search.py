@@ -5,7 +5,8 @@ re-estimated with the base whenever one joins, members that no longer pay are dr
 best set is exchanged for every other effect that might do its work. Each effect is fitted alone; what it
 could gain beside others is predicted by one Gauss-Newton step from there, and the promising ones are fitted.
 Where one effect leaves much, or many were needed, what every vehicle has is fitted together and pruned
-(host.diagnosis.together), unless one form of unknown physics leaves less (host.diagnosis.lone_form).
+(host.diagnosis.together), unless one form of unknown physics leaves less (host.diagnosis.lone_form); one
+that wanders with time must do better than they do.
 """
 
 from collections.abc import Callable, Iterable
@@ -15,6 +16,7 @@ from math import inf
 from host.catalogue import named
 from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE, has_memory
+from host.catalogue.unknown import WANDERING
 from host.diagnosis.absence import promises_more
 from host.diagnosis.exchange import exchanged
 from host.diagnosis.explanation import Explanation, Names
@@ -90,6 +92,8 @@ class Search:
                 break
             if size == 1 and self._may_be_foreign(beam[0]):
                 foreign = lone_form(self, beam[0])
+                if foreign is not None and self._is_only_flexible(foreign, beam[0]):
+                    break
         self.on_progress("settling")
         return completed(self, self._settled(with_best_offsets(self)))
 
@@ -198,6 +202,11 @@ class Search:
     def _may_be_foreign(self, leading: Explanation) -> bool:
         """Whether one effect leaves so much that a form of unknown physics is worth a look already."""
         return not self.root.fit.has_process_noise and self.fitter.excess(leading.fit) > LITTLE
+
+    def _is_only_flexible(self, foreign: Explanation, leading: Explanation) -> bool:
+        """Whether what wanders with time only stands for what every vehicle has, which moves as slowly."""
+        joint = together(self, leading) if foreign.names & WANDERING else None
+        return joint is not None and joint.bic < foreign.bic
 
     def _parents(self, grown: list[Explanation]) -> list[Explanation]:
         """The best sets, as far as they explain a fair part of what the very best does."""

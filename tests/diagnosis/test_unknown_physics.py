@@ -1,5 +1,6 @@
 """Physics that no entry of the catalogue is must not pass for some of its entries."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +96,20 @@ def test_a_form_that_hardly_betters_what_is_known_is_no_lone_one() -> None:
         assert fitter.excess(fitter.root.fit) > 1.15 > fitter.excess(drag_alone.fit)
         assert lone_form(search, drag_alone) is None
         assert not any(names & UNKNOWN.keys() for names in search.tried)
+
+
+def test_what_wanders_with_time_gives_way_to_what_every_vehicle_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    fitter = Fitter([hidden_dive(duration=20.0)])
+    search = Search(fitter, Workers(fitter, 1), lambda _: None, fitter.base, fitter.root)
+    wandering, motion = (
+        replace(fitter.root, names=fitter.root.names | {name})
+        for name in ("unknown_wandering_moment", "unknown_moment_q_q")
+    )
+    for joint, gives_way in ((wandering.bic - 1.0, True), (wandering.bic + 1.0, False), (None, False)):
+        found = None if joint is None else replace(fitter.root, bic=joint)
+        monkeypatch.setattr("host.diagnosis.search.together", lambda *_, found=found: found)
+        assert search._is_only_flexible(wandering, fitter.root) == gives_way
+        assert not search._is_only_flexible(motion, fitter.root)
 
 
 def test_a_plane_that_bites_better_to_one_side_is_told_by_its_force_and_moment_together() -> None:
