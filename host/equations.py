@@ -25,21 +25,29 @@ STATES = ("w", "q", "theta", "zeta")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
-    """A coefficient of the equations, its unit, and the bounds no underwater vehicle exceeds."""
+    """A coefficient of the equations, its unit, and the bounds no underwater vehicle exceeds.
+
+    speed_power  the power of the forward speed with which it grows, where forces follow the speed
+    """
 
     name: str
     unit: str
     lower: float
     upper: float
     meaning: str
+    speed_power: int = 0
 
 
 PARAMETERS = (
-    Parameter(name="a1", unit="1/s", lower=-25.0, upper=-1e-4, meaning="heave damping"),
-    Parameter(name="a2", unit="1/s", lower=-25.0, upper=-1e-4, meaning="pitch damping"),
+    Parameter(name="a1", unit="1/s", lower=-25.0, upper=-1e-4, meaning="heave damping", speed_power=1),
+    Parameter(name="a2", unit="1/s", lower=-25.0, upper=-1e-4, meaning="pitch damping", speed_power=1),
     Parameter(name="a3", unit="1/s^2", lower=-1000.0, upper=5.0, meaning="pitch restoring"),
-    Parameter(name="b1", unit="m/s^2/rad", lower=-100.0, upper=100.0, meaning="plane force in heave"),
-    Parameter(name="b2", unit="1/s^2", lower=-1000.0, upper=1000.0, meaning="plane moment in pitch"),
+    Parameter(
+        name="b1", unit="m/s^2/rad", lower=-100.0, upper=100.0, meaning="plane force in heave", speed_power=2
+    ),
+    Parameter(
+        name="b2", unit="1/s^2", lower=-1000.0, upper=1000.0, meaning="plane moment in pitch", speed_power=2
+    ),
     Parameter(name="u0", unit="m/s", lower=0.0, upper=20.0, meaning="forward speed"),
     Parameter(name="heave_offset", unit="m/s^2", lower=-5.0, upper=5.0, meaning="trim force in heave"),
     Parameter(name="pitch_offset", unit="rad/s^2", lower=-20.0, upper=20.0, meaning="trim moment in pitch"),

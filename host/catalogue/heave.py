@@ -36,7 +36,9 @@ EFFECTS = (
         name="heave_pitch_rate_coupling",
         slot="heave",
         parameters=(
-            Parameter(name="c_wq", unit="m/s", lower=-20, upper=20, meaning="pitch rate into heave"),
+            Parameter(
+                name="c_wq", unit="m/s", lower=-20, upper=20, meaning="pitch rate into heave", speed_power=1
+            ),
         ),
         sentence="Pitching at a forward speed throws the hull sideways: the pitch rate drives heave "
         "(centripetal term m u q and Zq q), which the base model leaves out.",

@@ -53,7 +53,14 @@ EFFECTS = (
         name="munk_moment",
         slot="pitch",
         parameters=(
-            Parameter(name="c_qw", unit="rad/(m s)", lower=-100, upper=100, meaning="heave into pitch"),
+            Parameter(
+                name="c_qw",
+                unit="rad/(m s)",
+                lower=-100,
+                upper=100,
+                meaning="heave into pitch",
+                speed_power=1,
+            ),
         ),
         sentence="Heave velocity turns the hull (Munk moment): angle of attack drives pitch.",
         equation="q' = ... + c_qw w",

@@ -88,8 +88,21 @@ def side_of(explanation: Explanation) -> Side:
     return Side(names=explanation.names, values=_values(explanation))
 
 
+def at_speed(side: Side, speed: float) -> Side:
+    """The same physics at another forward speed, m/s: each coefficient grows with its power of it."""
+    parameters = [*PARAMETERS, *(p for name in side.names for p in named(name).parameters)]
+    growth = {p.name: (speed / side.values["u0"][0]) ** p.speed_power for p in parameters}
+    values = {name: (value * growth[name], std * growth[name]) for name, (value, std) in side.values.items()}
+    return replace(side, values=values | {"u0": (speed, side.values["u0"][1])})
+
+
 def compare(fitter: Fitter, own: Explanation, other: Side) -> Comparison:
-    """Sets the explanation of the fitter's recordings against the other side."""
+    """Sets the explanation of the fitter's recordings against the other side.
+
+    Where forces follow a measured speed, both are told at the recordings' own.
+    """
+    if fitter.recordings[0].has_speed and "speed_loss" in own.names | other.names:
+        other = at_speed(other, fitter.held["u0"])
     joint = _in_words_of(fitter, own, other)
     free = fitter.free(joint.names)
     is_free = dict(zip(joint.fit.structure.names, free.tolist(), strict=True))

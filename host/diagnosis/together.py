@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from host.catalogue import ORDINARY
 from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE
+from host.diagnosis.continuation import continued
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.leftover import is_above_floor
 from host.diagnosis.margins import FEW, LITTLE, MUCH, SMALL, margin
@@ -28,7 +29,7 @@ HARDLY_LESS = 0.95  # of what is left over the noise floor: another effect besid
 def together(search: "Search", leading: Explanation) -> Explanation | None:
     """The leading set with all that every vehicle has, more if need be, pruned; None if too much is left."""
     search.on_progress("what every vehicle has")
-    fitter, best = search.fitter, with_ordinary(search, leading)
+    fitter, best = search.fitter, _joint(search, leading)
     left = fitter.excess(best.fit)
     for _ in range(MOST_BESIDE):
         if left < LITTLE:
@@ -82,6 +83,19 @@ def with_ordinary(search: "Search", explanation: Explanation) -> Explanation:
                 explanation = grown
     search.joint.add(explanation.names)
     return search.remember(search.fitter.polished(explanation))
+
+
+def _joint(search: "Search", leading: Explanation) -> Explanation:
+    """All that every vehicle has: by continuation, which needs no set to begin with, or joining one."""
+    names = frozenset({*ORDINARY, FREE_TRIM.name, PLANE_BEFORE.name})
+    found = continued(search, names, MOST_BESIDE)
+    if found is None:
+        return with_ordinary(search, leading)
+    best = search.remember(search.fitter.polished(found))
+    search.joint.add(best.names)
+    if search.fitter.excess(best.fit) < LITTLE:
+        return best
+    return min(best, with_ordinary(search, leading), key=lambda e: e.bic)
 
 
 def _more(search: "Search", best: Explanation) -> list[Task]:

@@ -10,7 +10,7 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.diagnosis.answer import Answer
-from host.diagnosis.comparison import Comparison, EffectDifference, sentences
+from host.diagnosis.comparison import Comparison, EffectDifference, Side, at_speed, sentences
 from host.diagnosis.diagnose import Diagnosis
 from host.diagnosis.files import document
 from host.diagnosis.given_simulation import against_simulation, check_same_flight
@@ -64,6 +64,31 @@ def test_of_what_was_measured_no_coefficient_is_told() -> None:
     )
     (said,) = sentences(Comparison(effects=[missing], parameters=[]), "simulation")
     assert said == "speed loss is missing from the simulation."
+
+
+def test_the_same_hull_at_another_speed_is_the_same() -> None:
+    values = {
+        "a1": -0.6,
+        "a2": -0.7,
+        "a3": -0.5,
+        "b1": -0.2,
+        "b2": -1.4,
+        "u0": 1.5,
+        "c_wq": 0.6,
+        "c_qq": -23.0,
+    }
+    values |= {"heave_offset": 0.0, "pitch_offset": 0.0}
+    names = frozenset({"heave_pitch_rate_coupling", "pitch_quadratic_damping"})
+    slower = at_speed(
+        Side(names=names, values={name: (value, 0.1) for name, value in values.items()}), 1.2
+    ).values
+    ratio = 1.2 / 1.5
+    assert slower["a1"] == pytest.approx((-0.6 * ratio, 0.1 * ratio))
+    assert slower["c_wq"] == pytest.approx((0.6 * ratio, 0.1 * ratio))
+    assert slower["b2"] == pytest.approx((-1.4 * ratio**2, 0.1 * ratio**2))
+    assert slower["a3"] == (-0.5, 0.1)  # weight knows no speed
+    assert slower["c_qq"] == (-23.0, 0.1)
+    assert slower["u0"][0] == 1.2
 
 
 def test_a_weaker_effect_in_the_simulation_is_no_missing_one(coupled: Diagnosis) -> None:

@@ -24,7 +24,7 @@ class Rounds:
         self.fitter = SimpleNamespace(excess=lambda fit: fit)
         self.workers = SimpleNamespace(results=self._next)
         self.leading = SimpleNamespace(names=frozenset({0}), fit=20.0, bic=0.0)
-        patch.setattr(module, "with_ordinary", lambda search, _: search.sets[0])
+        patch.setattr(module, "_joint", lambda search, _: search.sets[0])
         patch.setattr(module, "_more", lambda *_: [])
         patch.setattr(module, "margin", lambda _: 6.0)
         patch.setattr(module, "pruned", lambda _, best: best)

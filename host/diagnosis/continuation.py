@@ -1,0 +1,110 @@
+"""Many effects at once by continuation: first the measurements steer the state, at last they only judge it.
+
+The free run of a vehicle that turns broadside, or of one whose equations lack much, soon has nothing to do
+with the recording: its likelihood has many maxima, and none of them tells what is missing. Under unknown
+forces as large as all that act, a Kalman filter follows the measurements, and the likelihood is nearly that
+of a regression, with one maximum. The forces are let go in stages, the coefficients following; what they
+still make up for at some stage is shown by what an effect would gain there, and it joins (continuation, or
+homotopy: Allgower and Georg, Introduction to Numerical Continuation Methods).
+"""
+
+from math import log
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from host.catalogue import named, structure_of
+from host.diagnosis.explanation import Explanation, Names
+from host.diagnosis.first_guess import first_guess
+from host.diagnosis.margins import LITTLE, NAMING_MARGIN
+from host.diagnosis.prospects import probed
+from host.diagnosis.starts import with_other_moments
+from host.filter_error import filter_error_from
+from host.gauss_newton import Point
+
+if TYPE_CHECKING:
+    from host.diagnosis.fitter import Fitter
+    from host.diagnosis.search import Search
+
+STAGES = tuple(10.0 ** (-k / 2) for k in range(1, 17))
+"""Variance of the unknown force over that of all force."""
+PLACES = 3  # in which an effect that joins begins
+STEPS = 10  # of the parameters at each stage
+LIKELY = {"restoring_share": 1.0, "kinematics_share": 1.0, "pendulum_share": 1.0}  # sin, cos; a pendulum
+
+
+def continued(search: "Search", names: Names, most_beside: int) -> Explanation | None:
+    """The set, with at most so many effects more; None where the filter loses the recording."""
+    fitter = search.fitter
+    point, joined = _begun(fitter, names), 0
+    for share in STAGES:
+        forces = [share * acceleration**2 for acceleration in fitter.accelerations]
+        steered = _steered(fitter, point.with_noise(np.array([*fitter.floor, *forces])))
+        while steered is not None and joined < most_beside and _lacks_something(steered):
+            steered = _with_moments_moved(fitter, steered)
+            larger = _larger(search, steered) if _lacks_something(steered) else None
+            if larger is None:
+                break
+            steered, joined = larger, joined + 1
+        if steered is None:
+            return None
+        names, point = steered.names, _at(steered)
+    free = point.with_noise(np.array([*fitter.floor, 0.0, 0.0]))
+    return fitter.explained(names, fitter.fitted([free]))
+
+
+def _lacks_something(steered: Explanation) -> bool:
+    """Whether these forces and the sensors' noise are not enough for what is left."""
+    squares = [np.nanmean(np.hstack(steered.fit.whitened)[channel] ** 2) for channel in range(2)]
+    return bool(max(squares) > LITTLE)
+
+
+def _larger(search: "Search", steered: Explanation) -> Explanation | None:
+    """The set with the effect that gains most under these forces, where any does."""
+    fitter, charge = search.fitter, log(steered.fit.samples)
+    gains = {
+        name: ahead - charge * fitter.free_parameters(frozenset({name}))
+        for name, ahead in search.gains(steered).items()
+    }
+    name = max(gains, key=lambda one: gains[one])
+    likely = sorted(probed(fitter, steered, named(name), []), key=lambda pair: -pair[0])
+    starts = [fitter.point(steered.names | {name}, steered, name, probe) for _, probe in likely]
+    best = _likeliest(fitter, starts[:PLACES], steered)
+    return best if best.fit.log_likelihood > steered.fit.log_likelihood + NAMING_MARGIN else None
+
+
+def _with_moments_moved(fitter: "Fitter", steered: Explanation) -> Explanation:
+    """The set with its moments where they are likeliest: as the forces fall, another rest of the plane."""
+    return _likeliest(fitter, with_other_moments(fitter, steered), steered)
+
+
+def _likeliest(fitter: "Fitter", starts: list[Point], steered: Explanation) -> Explanation:
+    ends = [end for start in starts if (end := _steered(fitter, start)) is not None]
+    return max([steered, *ends], key=lambda end: end.fit.log_likelihood)
+
+
+def _at(steered: Explanation) -> Point:
+    fit = steered.fit
+    return Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+
+
+def _steered(fitter: "Fitter", point: Point) -> Explanation | None:
+    """A few steps of the parameters under the point's forces."""
+    names = frozenset(effect.name for effect in point.structure.effects)
+    inputs = fitter.inputs(names, for_filter=True)
+    fit = filter_error_from(point, inputs, fitter.free(names), STEPS, holds_noise=True)
+    return fitter.explained(names, fit) if np.isfinite(fit.log_likelihood) else None
+
+
+def _begun(fitter: "Fitter", names: Names) -> Point:
+    """The values of a regression, those of most vehicles, or none: no set is needed to begin with."""
+    structure, root = structure_of(names), fitter.root.fit
+    rough = first_guess(fitter.thinned, fitter.speed, names)
+    values = dict(zip(root.structure.names, root.parameters.tolist(), strict=True))
+    for effect in structure.effects:
+        for parameter, probe in zip(effect.parameters, effect.probes[0], strict=True):
+            is_size = parameter.name in effect.size_names
+            values.setdefault(parameter.name, LIKELY.get(parameter.name, 0.0 if is_size else probe))
+    values |= {name: value for name, value in (rough | fitter.held).items() if name in values}
+    start = structure.clipped(np.array([values[name] for name in structure.names]))
+    return Point(structure, start, root.initial, root.levels)
