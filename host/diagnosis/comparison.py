@@ -101,7 +101,8 @@ def compare(fitter: Fitter, own: Explanation, other: Side) -> Comparison:
 
     Where forces follow a measured speed, both are told at the recordings' own.
     """
-    if fitter.recordings[0].has_speed and "speed_loss" in own.names | other.names:
+    is_speed_told = fitter.recordings[0].has_speed and other.values["u0"][0] > 0.0
+    if is_speed_told and "speed_loss" in own.names | other.names:
         other = at_speed(other, fitter.held["u0"])
     joint = _in_words_of(fitter, own, other)
     free = fitter.free(joint.names)
