@@ -5,10 +5,10 @@ with the recording: its likelihood has many maxima, and none of them tells what 
 forces as large as all that act, a Kalman filter follows the measurements, and the likelihood is nearly that
 of a regression, with one maximum. The forces are let go in stages, the coefficients following; what they
 still make up for at some stage is shown by what an effect would gain there, and it joins (continuation, or
-homotopy: Allgower and Georg, Introduction to Numerical Continuation Methods).
+homotopy: Allgower and Georg, Introduction to Numerical Continuation Methods). What is large would bend the
+rest before it seems to be lacking, so the first stage is asked at once.
 """
 
-from math import log
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +21,7 @@ from host.diagnosis.prospects import probed
 from host.diagnosis.starts import with_other_moments
 from host.filter_error import filter_error_from
 from host.gauss_newton import Point
-from host.valleys import USUAL_SPEED, plausibility
+from host.valleys import USUAL_SPEED
 
 if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
@@ -29,43 +29,48 @@ if TYPE_CHECKING:
 
 STAGES = tuple(10.0 ** (-k / 2) for k in range(1, 17))
 """Variance of the unknown force over that of all force."""
-FOLLOWED = 2  # of the stages, before anything may join
-WHERE_ASKED = 0.02  # the share down to which it is asked what gains, although nothing seems to be lacking
-CLEARLY = 50.0  # of BIC, that it must gain there
-PLACES = 3  # in which an effect that joins begins
-STEPS = 10  # of the parameters at each stage
+UNDECIDED = 4  # stages, through which sets with an effect that gains at the first are followed side by side
+CLEARLY = 50.0  # of BIC, that one of them must be ahead then, where nothing seems to be lacking without it
+PROMISING, MOST_PROMISING = 2, 3  # effects that are tried where one may join, and at the first stage
+PLACES = 2  # in which each of them begins
+SLIGHTLY = 1.05  # times the variance expected: enough for another look at the moments
+FEW_STEPS, STEPS = 10, 40  # of the parameters at one stage: many lie along a ridge, where a stage is slow
 LIKELY = {"restoring_share": 1.0, "kinematics_share": 1.0, "pendulum_share": 1.0}  # sin, cos; a pendulum
 
 
-def continued(
-    search: "Search", names: Names, most_beside: int, asks_early: bool = True
-) -> Explanation | None:
-    """The set, with at most so many effects more; None where the filter loses the recording.
-
-    asks_early  whether the first stages ask what gains although nothing seems to be lacking: what is large
-                shows there before it bends the rest, what is small may be mistaken
-    """
-    fitter, joined = search.fitter, 0
-    starts = [_begun(fitter, names, speed) for speed in _speeds(fitter)]
-    ends = [end for start in starts if (end := _followed(fitter, start)) is not None]
-    steered = max(ends, key=lambda end: plausibility(end.fit), default=None)
-    for share in STAGES[FOLLOWED - 1 :]:
-        if steered is None:
-            return None
-        steered = _steered(fitter, _under(fitter, _at(steered), share))
-        while steered is not None and joined < most_beside:
-            if _lacks_something(steered):
-                steered = _with_moments_moved(fitter, steered)
-            is_lacking = _lacks_something(steered)
-            if not is_lacking and not (asks_early and share > WHERE_ASKED):
+def continued(search: "Search", names: Names, most_beside: int) -> Explanation | None:
+    """The set, with at most so many effects more; None where the filter loses the recording."""
+    fitter = search.fitter
+    steered = _with_what_is_large(search, names)
+    for share in STAGES[UNDECIDED:]:
+        steered = _moved(search, _under(search, steered, share, STEPS))
+        while steered and _lacks(steered[0], LITTLE) and len(steered[0].names - names) < most_beside:
+            larger = _best_of_each(_larger(search, steered[0], PROMISING))[:1]
+            if not larger or larger[0].bic > steered[0].bic - NAMING_MARGIN:
                 break
-            larger = _larger(search, steered, NAMING_MARGIN if is_lacking else CLEARLY)
-            if larger is None:
-                break
-            steered, joined = larger, joined + 1
-    if steered is None:
+            steered = _moved(search, larger)
+    if not steered:
         return None
-    return fitter.explained(steered.names, fitter.fitted([_under(fitter, _at(steered), 0.0)]))
+    return fitter.explained(steered[0].names, fitter.fitted([_forced(fitter, _at(steered[0]), 0.0)]))
+
+
+def _with_what_is_large(search: "Search", names: Names) -> list[Explanation]:
+    """The set through the first stages, or with an effect that shows there, before it bends the rest.
+
+    The speed that is likeliest without an effect may be one that does its work, so it is asked from all of
+    them what gains; and until fewer forces are there another effect may gain more than the one at work.
+    """
+    fitter = search.fitter
+    begun = [_begun(fitter, names, speed) for speed in _speeds(fitter)]
+    plain = _steered(search, [_forced(fitter, point, STAGES[0]) for point in begun])
+    larger = [end for parent in plain for end in _larger(search, parent, MOST_PROMISING)]
+    followed = [*plain, *_best_of_each(larger)[:MOST_PROMISING]]
+    for share in STAGES[1:UNDECIDED]:
+        followed = _best_of_each(_under(search, followed, share))
+    without = next((one for one in followed if one.names == names), None)
+    if without is None or followed[0].bic < without.bic - CLEARLY:
+        return followed[:1]
+    return [without]
 
 
 def _speeds(fitter: "Fitter") -> list[float]:
@@ -75,51 +80,47 @@ def _speeds(fitter: "Fitter") -> list[float]:
     return [fitter.speed, *(factor * USUAL_SPEED for factor in (0.5, 1.0, 2.0))]
 
 
-def _followed(fitter: "Fitter", point: Point) -> Explanation | None:
-    """Through the first stages, in which the coefficients leave those of the regression."""
-    steered = None
-    for share in STAGES[:FOLLOWED]:
-        steered = _steered(fitter, _under(fitter, point, share))
-        if steered is None:
-            return None
-        point = _at(steered)
-    return steered
-
-
-def _under(fitter: "Fitter", point: Point, share: float) -> Point:
+def _forced(fitter: "Fitter", point: Point, share: float) -> Point:
     """The point under this share of all force, with the sensors' noise."""
     forces = [share * acceleration**2 for acceleration in fitter.accelerations]
     return point.with_noise(np.array([*fitter.floor, *forces]))
 
 
-def _lacks_something(steered: Explanation) -> bool:
-    """Whether these forces and the sensors' noise are not enough for what is left."""
+def _under(
+    search: "Search", followed: list[Explanation], share: float, steps: int = FEW_STEPS
+) -> list[Explanation]:
+    return _steered(search, [_forced(search.fitter, _at(one), share) for one in followed], steps)
+
+
+def _lacks(steered: Explanation, most: float) -> bool:
+    """Whether more is left, in either channel, than so many times what forces and noise account for."""
     squares = [np.nanmean(np.hstack(steered.fit.whitened)[channel] ** 2) for channel in range(2)]
-    return bool(max(squares) > LITTLE)
+    return bool(max(squares) > most)
 
 
-def _larger(search: "Search", steered: Explanation, least: float) -> Explanation | None:
-    """The set with the effect that gains most under these forces, where any gains so much of BIC."""
-    fitter, charge = search.fitter, log(steered.fit.samples)
-    gains = {
-        name: ahead - charge * fitter.free_parameters(frozenset({name}))
-        for name, ahead in search.gains(steered).items()
-    }
-    name = max(gains, key=lambda one: gains[one])
-    likely = sorted(probed(fitter, steered, named(name), []), key=lambda pair: -pair[0])
-    starts = [fitter.point(steered.names | {name}, steered, name, probe) for _, probe in likely]
-    best = _likeliest(fitter, starts[:PLACES], steered)
-    return best if best.fit.log_likelihood > steered.fit.log_likelihood + least / 2.0 else None
+def _best_of_each(found: list[Explanation]) -> list[Explanation]:
+    """The likeliest of each set, the likeliest set first."""
+    best: dict[Names, Explanation] = {}
+    for one in sorted(found, key=lambda one: one.bic):
+        best.setdefault(one.names, one)
+    return list(best.values())
 
 
-def _with_moments_moved(fitter: "Fitter", steered: Explanation) -> Explanation:
-    """The set with its moments where they are likeliest: as the forces fall, another rest of the plane."""
-    return _likeliest(fitter, with_other_moments(fitter, steered), steered)
+def _larger(search: "Search", parent: Explanation, most: int) -> list[Explanation]:
+    """The set with one effect more, of those that promise most under these forces."""
+    gains, starts = search.gains(parent), []
+    for name in sorted(gains, key=lambda name: -gains[name])[:most]:
+        likely = sorted(probed(search.fitter, parent, named(name), []), key=lambda pair: -pair[0])
+        names = parent.names | {name}
+        starts += [search.fitter.point(names, parent, name, probe) for _, probe in likely[:PLACES]]
+    return _steered(search, starts)
 
 
-def _likeliest(fitter: "Fitter", starts: list[Point], steered: Explanation) -> Explanation:
-    ends = [end for start in starts if (end := _steered(fitter, start)) is not None]
-    return max([steered, *ends], key=lambda end: end.fit.log_likelihood)
+def _moved(search: "Search", steered: list[Explanation]) -> list[Explanation]:
+    """The likeliest, its moments in another rest of the plane where as the forces fall that is likelier."""
+    if not steered or not _lacks(steered[0], SLIGHTLY):
+        return steered
+    return _best_of_each([*steered, *_steered(search, with_other_moments(search.fitter, steered[0]))])
 
 
 def _at(steered: Explanation) -> Point:
@@ -127,12 +128,17 @@ def _at(steered: Explanation) -> Point:
     return Point(fit.structure, fit.parameters, fit.initial, fit.noise)
 
 
-def _steered(fitter: "Fitter", point: Point) -> Explanation | None:
-    """A few steps of the parameters under the point's forces."""
+def _steered(search: "Search", points: list[Point], steps: int = FEW_STEPS) -> list[Explanation]:
+    """Where steps of the parameters lead under each point's forces, unless it loses the recording."""
+    found = search.workers.results([(_climbed, (point, steps)) for point in points])
+    return [one for one in found if np.isfinite(one.fit.log_likelihood)]
+
+
+def _climbed(fitter: "Fitter", point: Point, steps: int) -> Explanation:
     names = frozenset(effect.name for effect in point.structure.effects)
     inputs = fitter.inputs(names, for_filter=True)
-    fit = filter_error_from(point, inputs, fitter.free(names), STEPS, holds_noise=True)
-    return fitter.explained(names, fit) if np.isfinite(fit.log_likelihood) else None
+    fit = filter_error_from(point, inputs, fitter.free(names), steps, holds_noise=True)
+    return fitter.explained(names, fit)
 
 
 def _begun(fitter: "Fitter", names: Names, speed: float) -> Point:

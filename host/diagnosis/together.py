@@ -88,14 +88,11 @@ def with_ordinary(search: "Search", explanation: Explanation) -> Explanation:
 def _joint(search: "Search", leading: Explanation) -> Explanation:
     """All that every vehicle has: by continuation, which needs no set to begin with, or joining one."""
     names = frozenset({*ORDINARY, FREE_TRIM.name, PLANE_BEFORE.name})
+    found = continued(search, names, MOST_BESIDE)
     ends: list[Explanation] = []
-    for asks_early in (True, False):
-        found = continued(search, names, MOST_BESIDE, asks_early)
-        if found is not None:
-            ends.append(search.remember(search.fitter.polished(found)))
-            search.joint.add(found.names)
-            if search.fitter.excess(ends[-1].fit) < MUCH:
-                break
+    if found is not None:
+        ends.append(search.remember(search.fitter.polished(found)))
+        search.joint.add(found.names)
     if not any(search.fitter.excess(end.fit) < LITTLE for end in ends):
         ends.append(with_ordinary(search, leading))
     return min(ends, key=lambda e: e.bic)

@@ -86,6 +86,6 @@ def test_where_nothing_else_acts_nothing_joins() -> None:
 
 def test_a_recording_that_the_filter_loses_has_no_continuation(monkeypatch: pytest.MonkeyPatch) -> None:
     fitter = Fitter([unstable_dive(is_weakened=False)])
-    monkeypatch.setattr(module, "_steered", lambda *_: None)
+    monkeypatch.setattr(module, "_steered", lambda *_: [])
     with Workers(fitter, 1) as workers:
         assert continued(search_of(workers, fitter), NAMES, most_beside=3) is None
