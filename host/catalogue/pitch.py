@@ -24,6 +24,12 @@ def _restoring(c: Chain) -> None:
 
 def _pendulum(c: Chain) -> None:
     c.pitch += c.p["pendulum_share"] * c.p["a3"] / GRAVITY * (c.surge + c.q * c.w)
+    c.heave += c.p["pendulum_lever"] * c.q**2
+    if "speed_loss" in c.rates:
+        turning = (
+            c.p["a2"] * c.speed_ratio * c.q + c.p["a3"] * c.theta + c.p["b2"] * c.speed_ratio**2 * c.plane
+        )
+        c.rates["speed_loss"] -= c.p["c_uq"] * c.p["pendulum_lever"] * (turning + c.pitch)
 
 
 EFFECTS = (
@@ -87,12 +93,21 @@ EFFECTS = (
         slot="pitch",
         parameters=(
             Parameter(name="pendulum_share", unit="1", lower=0, upper=3, meaning="1 is that of the weight"),
+            Parameter(
+                name="pendulum_lever",
+                unit="m",
+                lower=0,
+                upper=1,
+                meaning="how low, by weight over heave mass",
+            ),
         ),
         sentence="The weight hangs below the centre of buoyancy like a pendulum: it feels the vehicle's own "
-        "acceleration along its axis as it feels gravity.",
-        equation="q' = a2 q + a3 [theta + pendulum_share (u' + q w)/g] + ...",
+        "acceleration along its axis as it feels gravity, and pulls at the hull as it swings.",
+        equation="q' = a2 q + a3 [theta + pendulum_share (u' + q w)/g] + ..., w' = ... + pendulum_lever q^2, "
+        "u' = ... - c_uq pendulum_lever q'",
         manoeuvre="full plane reversals at the highest speed, or changes of thrust with the planes level",
-        probes=((1.0,),),
+        probes=((1.0, 0.0), (1.0, 0.02)),
+        sizes=("pendulum_share", "pendulum_lever"),
         force=_pendulum,
     ),
 )

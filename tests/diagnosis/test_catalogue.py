@@ -169,7 +169,7 @@ def test_a_low_centre_of_gravity_feels_a_change_of_speed() -> None:
     still = hidden_dive(duration=30.0)
     ramp = replace(still, rudder=np.zeros(still.time.size), speed=2.0 + 0.05 * still.time)
     inputs = inputs_of(ramp, structure_of(("surge_pitch_coupling",)))
-    run = free_run(np.array([*BASE.values(), 0.0, 0.0, 1.0]), np.array([0.0, 0.0, 0.0, 20.0]), inputs)
+    run = free_run(np.array([*BASE.values(), 0.0, 0.0, 1.0, 0.0]), np.array([0.0, 0.0, 0.0, 20.0]), inputs)
     settled = run.outputs[0, 150:250]
     np.testing.assert_allclose(settled, -0.05 / 9.80665, rtol=0.02)
 
