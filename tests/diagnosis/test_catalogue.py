@@ -6,6 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from hidden_dive import BASE, hidden_dive
+from scipy.integrate import solve_ivp
 
 from host.catalogue import BY_NAME, CATALOGUE, UNKNOWN, structure_of
 from host.propagate import free_run, inputs_of
@@ -172,6 +173,45 @@ def test_a_low_centre_of_gravity_feels_a_change_of_speed() -> None:
     run = free_run(np.array([*BASE.values(), 0.0, 0.0, 1.0, 0.0]), np.array([0.0, 0.0, 0.0, 20.0]), inputs)
     settled = run.outputs[0, 150:250]
     np.testing.assert_allclose(settled, -0.05 / 9.80665, rtol=0.02)
+
+
+def test_a_low_centre_of_gravity_pulls_at_the_hull_as_it_swings() -> None:
+    # m (w' - u q - zG q^2) = Z and m (u' + w q + zG q') = X, beside the moment of the weight.
+    recording = hidden_dive(duration=20.0)
+    recovery, mass_ratio, lever, g = 20.0, 1.8, 0.05, 9.80665
+    structure = structure_of(("speed_loss", "surge_pitch_coupling"))
+    own = {
+        "speed_time": recovery,
+        "c_ud": 0.0,
+        "c_uq": mass_ratio,
+        "pendulum_share": 1.0,
+        "pendulum_lever": lever,
+    }
+    values = dict.fromkeys(structure.names, 0.0) | BASE | own
+    run = free_run(
+        np.array([values[name] for name in structure.names]), START, inputs_of(recording, structure, 0.025)
+    )
+    x, outputs = np.array([*START, 0.0]), []
+    for rudder in recording.rudder:
+        outputs.append(x[2:4])
+
+        def rate(_: float, x: np.ndarray, plane: float = rudder) -> list[float]:  # type: ignore[type-arg]
+            w, q, theta, _, change = x
+            ratio = 1.0 + change / BASE["u0"]
+            turning = BASE["a2"] * ratio * q + BASE["a3"] * theta + BASE["b2"] * ratio**2 * plane
+            loss = -change * (1.0 + ratio) / 2.0 / recovery - mass_ratio * w * q
+            # The weight is turned by u' as far as its own swing does not make it.
+            turning += BASE["a3"] / g * (loss + q * w)
+            return [
+                BASE["a1"] * ratio * w + BASE["b1"] * ratio**2 * plane + lever * q**2,
+                turning,
+                q,
+                w - (BASE["u0"] + change) * theta,
+                loss - mass_ratio * lever * turning,
+            ]
+
+        x = solve_ivp(rate, (0.0, recording.step), x, rtol=1e-8, atol=1e-10).y[:, -1]
+    np.testing.assert_allclose(run.outputs, np.array(outputs).T, atol=2e-3)
 
 
 @pytest.mark.parametrize("name", sorted((BY_NAME | UNKNOWN).keys()))
