@@ -8,30 +8,20 @@ from typing import NamedTuple
 import numpy as np
 
 from host.catalogue import BY_NAME, UNKNOWN, named
-from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.deviations import deviations
 from host.diagnosis.exchange import twins
+from host.diagnosis.explain import explain
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.leftover import leftover
 from host.diagnosis.locate import Location, locate
 from host.diagnosis.plane_choice import Way, by_single_effects, is_likelier, ways
-from host.diagnosis.pruning import leanest
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.sea_fits import WAVES, again_in_waves, with_regular_waves, with_sea
 from host.diagnosis.search import Search
-from host.diagnosis.seas import (
-    Explained,
-    Waves,
-    among_waves,
-    evidence,
-    explains_more,
-    in_a_sea,
-    in_plain_waves,
-)
+from host.diagnosis.seas import Explained, Waves, evidence
 from host.diagnosis.spans import Spans, divide, excerpt
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
-from host.diagnosis.unknown_physics import known_in, unknown_in, with_unknown
+from host.diagnosis.unknown_physics import known_in
 from host.diagnosis.verdict import Verdict, remaining, verdict_on
 from host.diagnosis.workers import Workers
 from host.equations import NAMES, Slot
@@ -94,18 +84,25 @@ class Judged(NamedTuple):
 
 
 def diagnose(
-    recordings: list[Recording], on_progress: Callable[[str], None] = lambda _: None, jobs: int = 1
+    recordings: list[Recording],
+    on_progress: Callable[[str], None] = lambda _: None,
+    jobs: int = 1,
+    like: Explanation | None = None,
 ) -> Diagnosis:
     """Finds what the paper's equations lack on these recordings of one vehicle, on `jobs` cores.
 
     Spikes are left out first, and it is asked what the plane did between rows: that is no physics.
+
+    like  an explanation of a vehicle that this one should resemble: if of many effects, it is begun with
     """
     on_progress("base model")
     first, *others = by_single_effects(ways(without_outliers(recordings)), on_progress, jobs)
-    return _diagnosed(first, others, on_progress, jobs)
+    return _diagnosed(first, others, on_progress, jobs, like)
 
 
-def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], jobs: int) -> Diagnosis:
+def _diagnosed(
+    way: Way, others: list[Way], on_progress: Callable[[str], None], jobs: int, like: Explanation | None
+) -> Diagnosis:
     """The diagnosis with the plane taken so, unless what is found speaks for another way."""
     recordings, fitter = way.recordings, way.fitter
     floor, spans = noise_floor(recordings), divide(recordings)
@@ -113,18 +110,18 @@ def _diagnosed(way: Way, others: list[Way], on_progress: Callable[[str], None], 
     if is_part:
         on_progress("an excerpt")
     with Workers(fitter, jobs) as workers:
-        explained = _explain(fitter, workers, on_progress, way)
+        explained = explain(fitter, workers, on_progress, way, like=like)
         again = next((other for other in others if _is_likelier(other, explained)), None)
         if again is None and not is_part:
             judged = _judge(explained, spans, floor, on_progress)
     if again is not None:
         on_progress("the plane between rows")
-        return _diagnosed(again, [], on_progress, jobs)
+        return _diagnosed(again, [], on_progress, jobs, like)
     if is_part:
         on_progress("the whole")
         fitter = Fitter(spans.teaching)
         with Workers(fitter, jobs) as workers:
-            explained = _explain(fitter, workers, on_progress, way, explained)
+            explained = explain(fitter, workers, on_progress, way, explained)
             judged = _judge(explained, spans, floor, on_progress)
     best, search, left, waves = explained
     on_progress("final fit on everything")
@@ -183,44 +180,6 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
     without_it = after if waves is None else misfit(waves.fitted, spans, floor)
     verdict = verdict_on(model, left, before, without_it, evidence(waves))
     return Judged(before, after, effects, verdict, _slots(search, best, effects, verdict))
-
-
-def _explain(
-    fitter: Fitter,
-    workers: Workers,
-    on_progress: Callable[[str], None],
-    way: Way,
-    part: Explained | None = None,
-) -> Explained:
-    """Searches for the best explanation, or goes on from that of a part, where most has been settled."""
-    known = None if part is None else part.search
-    search = Search(fitter, workers, on_progress, fitter.base, fitter.root, known, way.alone)
-    best = search.run([] if part is None else [fitter.refitted(one) for one in _found_in(part)])
-    waves = way.waves if part is None else None
-    left, told = leftover(fitter, best), None
-    if best.names or not left.is_nothing:
-        best = with_unknown(search, best)
-        left = leftover(fitter, best)
-    may_be_sea = part is None or part.best.fit.has_process_noise
-    if may_be_sea and (unknown_in(best) or not left.is_nothing):
-        calm, plain = best, None if waves is None else in_plain_waves(search, best, waves)
-        if plain is not None and plain.left.is_nothing:
-            return plain
-        search, best = in_a_sea(search, best)
-        if plain is not None and explains_more(plain, best):
-            return plain
-        if part is None or part.waves is not None:
-            search, best, told = among_waves(search, best, calm)
-        left = leftover(fitter, best if told is None else told.fitted)
-    if told is None and (lean := leanest(search, best)) is not best:
-        best, left = lean, leftover(fitter, lean)
-    return Explained(best, search, left, told)
-
-
-def _found_in(part: Explained) -> list[Explanation]:
-    """What explains a part best; and with names alone: a form fitted to a part may run away on the whole."""
-    names_only = (e for e in part.search.tried.values() if not e.names & {FREE_TRIM.name, *UNKNOWN})
-    return [part.best, min(names_only, key=lambda e: e.bic)] if unknown_in(part.best) else [part.best]
 
 
 def _named(search: Search, best: Explanation, spans: Spans, floor: Array, after: Misfit) -> list[NamedEffect]:

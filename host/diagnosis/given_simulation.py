@@ -40,7 +40,7 @@ def against_simulation(
     Raises RecordingError with one line when the two do not share recorded file, time span or rudder.
     """
     seen = _through_sensors_of(found.recordings, simulated, found.floor)
-    theirs = diagnose(seen, lambda stage: on_progress(f"simulation: {stage}"), jobs)
+    theirs = diagnose(seen, lambda stage: on_progress(f"simulation: {stage}"), jobs, like=found.extended)
     on_progress("simulation against recording")
     fitter = Fitter(found.recordings, known=found.extended)
     # Named at the sensors' noise, but measured with less of it: a simulator's coefficients are exact.

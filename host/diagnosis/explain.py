@@ -1,0 +1,64 @@
+"""From the recordings to the explanation: the search, then the doubt about what it found."""
+
+from collections.abc import Callable
+
+from host.catalogue import UNKNOWN
+from host.catalogue.nuisance import FREE_TRIM
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.leftover import leftover
+from host.diagnosis.margins import LARGEST_SET, LITTLE
+from host.diagnosis.plane_choice import Way
+from host.diagnosis.pruning import leanest
+from host.diagnosis.search import Search
+from host.diagnosis.seas import Explained, among_waves, explains_more, in_a_sea, in_plain_waves
+from host.diagnosis.unknown_physics import unknown_in, with_unknown
+from host.diagnosis.workers import Workers
+
+
+def explain(
+    fitter: Fitter,
+    workers: Workers,
+    on_progress: Callable[[str], None],
+    way: Way,
+    part: Explained | None = None,
+    like: Explanation | None = None,
+) -> Explained:
+    """Searches for the best explanation, or goes on from that of a part, where most has been settled."""
+    known = None if part is None else part.search
+    search = Search(fitter, workers, on_progress, fitter.base, fitter.root, known, way.alone)
+    again = [fitter.refitted(one) for one in _found_in(part)] if part else _alike(fitter, like)
+    best = search.run(again)
+    waves = way.waves if part is None else None
+    left, told = leftover(fitter, best), None
+    if best.names or not left.is_nothing:
+        best = with_unknown(search, best)
+        left = leftover(fitter, best)
+    may_be_sea = part is None or part.best.fit.has_process_noise
+    if may_be_sea and (unknown_in(best) or not left.is_nothing):
+        calm, plain = best, None if waves is None else in_plain_waves(search, best, waves)
+        if plain is not None and plain.left.is_nothing:
+            return plain
+        search, best = in_a_sea(search, best)
+        if plain is not None and explains_more(plain, best):
+            return plain
+        if part is None or part.waves is not None:
+            search, best, told = among_waves(search, best, calm)
+        left = leftover(fitter, best if told is None else told.fitted)
+    if told is None and (lean := leanest(search, best)) is not best:
+        best, left = lean, leftover(fitter, lean)
+    return Explained(best, search, left, told)
+
+
+def _alike(fitter: Fitter, like: Explanation | None) -> list[Explanation]:
+    """The set of a similar vehicle, where it is one of many effects and leaves little: a long search less."""
+    if like is None or len(like.names) <= LARGEST_SET or like.fit.has_process_noise:
+        return []
+    again = fitter.refitted(like)
+    return [again] if fitter.excess(again.fit) < LITTLE else []
+
+
+def _found_in(part: Explained) -> list[Explanation]:
+    """What explains a part best; and with names alone: a form fitted to a part may run away on the whole."""
+    names_only = (e for e in part.search.tried.values() if not e.names & {FREE_TRIM.name, *UNKNOWN})
+    return [part.best, min(names_only, key=lambda e: e.bic)] if unknown_in(part.best) else [part.best]
