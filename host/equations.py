@@ -123,6 +123,7 @@ class Effect:
     lags      whether it looks at earlier commands
     is_common whether every vehicle has it: always tried, and preferred where the recording cannot decide
     beside    the effect without which it seldom acts
+    changes   effects whose terms it changes: without any of them it does nothing
     """
 
     name: str
@@ -147,6 +148,7 @@ class Effect:
     lags: bool = False
     is_common: bool = False
     beside: str | None = None
+    changes: tuple[str, ...] = ()
 
     @property
     def size_names(self) -> tuple[str, ...]:

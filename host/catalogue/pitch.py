@@ -5,6 +5,8 @@ import casadi as ca
 from host.catalogue.gravity import GRAVITY
 from host.equations import Chain, Effect, Parameter
 
+TINY = 1e-9  # m/s, beside a speed that may be nothing
+
 
 def _damping(c: Chain) -> None:
     c.pitch += c.p["c_qq"] * c.q * ca.fabs(c.q)
@@ -20,6 +22,20 @@ def _munk(c: Chain) -> None:
 
 def _restoring(c: Chain) -> None:
     c.pitch += c.p["restoring_share"] * c.p["a3"] * (ca.sin(c.theta) - c.theta)
+
+
+def _drag_along_the_hull(c: Chain) -> None:
+    # With s = w / (l q): 1/2 int (s - y)|s - y| dy over -1..1 in heave, -2 int y (s - y)|s - y| dy in pitch.
+    half = c.p["drag_half_length"]
+    heaving, turning = ca.fabs(c.w), half * ca.fabs(c.q)
+    more, less = ca.fmax(heaving, turning), ca.fmin(heaving, turning)
+    share = less / (more + TINY)
+    if "c_ww" in c.p:
+        c.heave += c.p["c_ww"] * c.w * (more + less * share / 3 - heaving)
+    if "c_qq" in c.p:
+        mostly_turns = turning * (1 + 2 * share**2 - share**4 / 3)
+        damped = ca.if_else(heaving > turning, 8 / 3 * heaving, mostly_turns)
+        c.pitch += c.p["c_qq"] * c.q * (damped - turning) / half
 
 
 def _pendulum(c: Chain) -> None:
@@ -43,6 +59,22 @@ EFFECTS = (
         probes=((-2.0,),),
         force=_damping,
         is_common=True,
+    ),
+    Effect(
+        name="drag_along_the_hull",
+        slot="pitch",
+        parameters=(
+            Parameter(name="drag_half_length", unit="m", lower=0.05, upper=50, meaning="of what is dragged"),
+        ),
+        sentence="A hull that heaves and pitches meets the water at another speed at either end: the drag of "
+        "the one motion depends on the other (cross-flow drag along the hull).",
+        equation="w|w| -> 1/(2 l) int (w - x q)|w - x q| dx, q|q| -> -2/l^4 int x (w - x q)|w - x q| dx, "
+        "x = -l...l, l = drag_half_length",
+        manoeuvre="quick plane reversals after climbs and dives in which the hull has heaved long",
+        probes=((0.5,), (3.0,)),
+        sizes=(),
+        force=_drag_along_the_hull,
+        changes=("heave_quadratic_drag", "pitch_quadratic_damping"),
     ),
     Effect(
         name="trim_moment",

@@ -27,10 +27,11 @@ if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
     from host.diagnosis.search import Search
 
+ALONG_THE_HULL = "drag_along_the_hull"  # of every long hull, but of no simulator that knows two drags only
 STAGES = tuple(10.0 ** (-k / 2) for k in range(1, 17))
 """Variance of the unknown force over that of all force."""
 UNDECIDED = 4  # stages, through which sets with an effect that gains at the first are followed side by side
-CLEARLY = 50.0  # of BIC, that one of them must be ahead then, where nothing seems to be lacking without it
+CLEARLY = 50.0  # of BIC, that each must gain by then, where nothing seems to be lacking without it
 PROMISING, MOST_PROMISING = 2, 3  # effects that are tried where one may join, and at the first stage
 PLACES = 2  # in which each of them begins
 SLIGHTLY = 1.05  # times the variance expected: enough for another look at the moments
@@ -39,12 +40,15 @@ LIKELY = {"restoring_share": 1.0, "kinematics_share": 1.0, "pendulum_share": 1.0
 
 
 def continued(search: "Search", names: Names, most_beside: int) -> Explanation | None:
-    """The set, with at most so many effects more; None where the filter loses the recording."""
-    fitter = search.fitter
+    """The set, with drag along the hull or not, and at most so many effects more.
+
+    None where the filter loses the recording.
+    """
+    fitter, common = search.fitter, names | {ALONG_THE_HULL}
     steered = _with_what_is_large(search, names)
     for share in STAGES[UNDECIDED:]:
         steered = _moved(search, _under(search, steered, share, STEPS))
-        while steered and _lacks(steered[0], LITTLE) and len(steered[0].names - names) < most_beside:
+        while steered and _lacks(steered[0], LITTLE) and len(steered[0].names - common) < most_beside:
             larger = _best_of_each(_larger(search, steered[0], PROMISING))[:1]
             if not larger or larger[0].bic > steered[0].bic - NAMING_MARGIN:
                 break
@@ -63,14 +67,14 @@ def _with_what_is_large(search: "Search", names: Names) -> list[Explanation]:
     fitter = search.fitter
     begun = [_begun(fitter, names, speed) for speed in _speeds(fitter)]
     plain = _steered(search, [_forced(fitter, point, STAGES[0]) for point in begun])
-    larger = [end for parent in plain for end in _larger(search, parent, MOST_PROMISING)]
-    followed = [*plain, *_best_of_each(larger)[:MOST_PROMISING]]
+    along = _steered(search, [at for one in plain for at in _starts(search, one, ALONG_THE_HULL)])
+    followed = [*plain, *along]
+    for parents in (plain, _best_of_each(along)):
+        larger = [end for parent in parents for end in _larger(search, parent, MOST_PROMISING)]
+        followed += _best_of_each(larger)[:MOST_PROMISING]
     for share in STAGES[1:UNDECIDED]:
         followed = _best_of_each(_under(search, followed, share))
-    without = next((one for one in followed if one.names == names), None)
-    if without is None or followed[0].bic < without.bic - CLEARLY:
-        return followed[:1]
-    return [without]
+    return sorted(followed, key=lambda one: one.bic + CLEARLY * len(one.names))[:1]
 
 
 def _speeds(fitter: "Fitter") -> list[float]:
@@ -108,12 +112,16 @@ def _best_of_each(found: list[Explanation]) -> list[Explanation]:
 
 def _larger(search: "Search", parent: Explanation, most: int) -> list[Explanation]:
     """The set with one effect more, of those that promise most under these forces."""
-    gains, starts = search.gains(parent), []
-    for name in sorted(gains, key=lambda name: -gains[name])[:most]:
-        likely = sorted(probed(search.fitter, parent, named(name), []), key=lambda pair: -pair[0])
-        names = parent.names | {name}
-        starts += [search.fitter.point(names, parent, name, probe) for _, probe in likely[:PLACES]]
-    return _steered(search, starts)
+    gains = search.gains(parent)
+    names = sorted(gains, key=lambda name: -gains[name])[:most]
+    return _steered(search, [start for name in names for start in _starts(search, parent, name)])
+
+
+def _starts(search: "Search", parent: Explanation, name: str) -> list[Point]:
+    """The set with this effect more, where that promises most."""
+    likely = sorted(probed(search.fitter, parent, named(name), []), key=lambda pair: -pair[0])
+    names = parent.names | {name}
+    return [search.fitter.point(names, parent, name, probe) for _, probe in likely[:PLACES]]
 
 
 def _moved(search: "Search", steered: list[Explanation]) -> list[Explanation]:

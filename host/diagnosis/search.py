@@ -278,10 +278,14 @@ class Search:
     def _candidates(self, parent: Explanation) -> list[str]:
         """What may join a set: the offsets only once the free trim, which does their work, has gone.
 
-        And where the plane was before, once it matters.
+        What changes other terms joins these; and where the plane was before, once it matters.
         """
         barred = {*parent.names, *(OFFSETS if FREE_TRIM.name in parent.names else ())}
-        candidates = [effect.name for effect in self.fitter.candidates if effect.name not in barred]
+        candidates = [
+            effect.name
+            for effect in self.fitter.candidates
+            if effect.name not in barred and (not effect.changes or parent.names & {*effect.changes})
+        ]
         if PLANE_BEFORE.name not in parent.names and any(has_memory(named(name)) for name in parent.names):
             candidates.append(PLANE_BEFORE.name)
         return candidates

@@ -3,10 +3,11 @@
 from dataclasses import replace
 from itertools import combinations
 
+import casadi as ca
 import numpy as np
 import pytest
 from hidden_dive import BASE, hidden_dive
-from scipy.integrate import solve_ivp
+from scipy.integrate import solve_ivp, trapezoid
 
 from host.catalogue import BY_NAME, CATALOGUE, UNKNOWN, structure_of
 from host.propagate import free_run, inputs_of
@@ -38,9 +39,10 @@ def test_catalogue_holds_every_name_that_users_rely_on() -> None:
 
 
 PAIRS = [("actuator_lag", "actuator_rate_limit"), ("depth_sensor_lag", "depth_sensor_lever_arm")]
+WITH_WHAT_THEY_CHANGE = [(*effect.changes, name) for name, effect in sorted(BY_NAME.items())]
 
 
-@pytest.mark.parametrize("names", [*((name,) for name in sorted(BY_NAME)), *PAIRS], ids="+".join)
+@pytest.mark.parametrize("names", [*WITH_WHAT_THEY_CHANGE, *PAIRS], ids="+".join)
 def test_effects_act_and_their_sensitivities_are_exact(names: tuple[str, ...]) -> None:
     recording = hidden_dive(duration=30.0)
     structure = structure_of(names)
@@ -173,6 +175,24 @@ def test_a_low_centre_of_gravity_feels_a_change_of_speed() -> None:
     run = free_run(np.array([*BASE.values(), 0.0, 0.0, 1.0, 0.0]), np.array([0.0, 0.0, 0.0, 20.0]), inputs)
     settled = run.outputs[0, 150:250]
     np.testing.assert_allclose(settled, -0.05 / 9.80665, rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("w", "q"), [(0.3, 0.1), (0.1, 0.3), (-0.2, 0.5), (0.4, -0.5), (0.0, 0.3), (0.3, 0.0), (0.4, 0.5)]
+)
+def test_drag_along_the_hull_is_the_integral_over_its_length(w: float, q: float) -> None:
+    half, drag, damping = 0.8, -1.5, -4.0
+    structure = structure_of(("heave_quadratic_drag", "pitch_quadratic_damping", "drag_along_the_hull"))
+    own = {"c_ww": drag, "c_qq": damping, "drag_half_length": half}
+    values = dict.fromkeys(structure.names, 0.0) | own
+    chain = structure.chain(
+        *map(ca.DM, ([w, q, 0.0, 0.0], [values[n] for n in structure.names], [0.0] * 6, 0.0))
+    )
+    force, moment = np.array(ca.evalf(structure.derivative(chain))).ravel()[:2]
+    y = np.linspace(-half, half, 20001)
+    local = (w - y * q) * np.abs(w - y * q)
+    assert force == pytest.approx(drag * trapezoid(local, y) / (2.0 * half), abs=1e-6)
+    assert moment == pytest.approx(damping * -2.0 / half**4 * trapezoid(y * local, y), abs=1e-6)
 
 
 def test_a_low_centre_of_gravity_pulls_at_the_hull_as_it_swings() -> None:
