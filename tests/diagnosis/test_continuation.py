@@ -1,5 +1,7 @@
 """Many effects found at once where the free run tells nothing: the measurements steer the state at first."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -15,13 +17,33 @@ from host.recording import Recording
 
 NAMES = frozenset({*ORDINARY, FREE_TRIM.name})
 WEAKENED_AT, WEAKENED_BY = 70.0, 0.4
+HALF_LENGTH = 0.8  # m
+Hull = dict[str, float]
+# Its heave turns it broadside (Munk) faster than its weight rights it, and drag alone holds it.
+SHORT = {
+    "a1": -0.65, "c_ww": -1.8, "c_wq": 0.6, "b1": -0.2,
+    "a2": -0.7, "c_qq": -23.0, "a3": -0.72, "c_qw": 4.6, "b2": -1.45,
+}  # fmt: skip
+LONG = {
+    "a1": -0.93, "c_ww": -2.3, "c_wq": 0.76, "b1": -0.72,
+    "a2": -1.6, "c_qq": -2.4, "a3": -0.5, "c_qw": 1.1, "b2": -2.8,
+}  # fmt: skip
+Drag = Callable[[float, float], tuple[float, float]]
 
 
-def unstable_dive(is_weakened: bool) -> Recording:
-    """A hull that its heave turns broadside (Munk) faster than its weight rights it, held by drag alone.
+def two_drags(w: float, q: float) -> tuple[float, float]:
+    return w * abs(w), q * abs(q)
 
-    From 70 s on its plane has lost two fifths, if so. Integrated by scipy; speed measured, constant.
-    """
+
+def along_the_hull(w: float, q: float) -> tuple[float, float]:
+    """Of 40 strips of a hull 2 x HALF_LENGTH long, each in the water that it meets."""
+    y = HALF_LENGTH * (np.arange(40) - 19.5) / 20.0
+    local = (w - y * q) * np.abs(w - y * q)
+    return float(np.mean(local)), float(-4.0 / HALF_LENGTH**3 * np.mean(y * local))
+
+
+def dive(hull: Hull, drag: Drag = two_drags, is_weakened: bool = False) -> Recording:
+    """Integrated by scipy; speed measured, constant. From 70 s on the plane has lost two fifths, if so."""
     rng = np.random.default_rng(3)
     h, rows = 0.1, 1400
     rudder, at = np.zeros(rows), 30
@@ -36,16 +58,21 @@ def unstable_dive(is_weakened: bool) -> Recording:
 
         def rate(_: float, x: np.ndarray, plane: float = share * rudder[k]) -> list[float]:  # type: ignore[type-arg]
             w, q, theta, _ = x
+            heaving, turning = drag(w, q)
             return [
-                -0.65 * w - 1.8 * w * abs(w) + 0.6 * q - 0.2 * plane,
-                -0.7 * q - 23.0 * q * abs(q) - 0.72 * np.sin(theta) + 4.6 * w - 1.45 * plane,
+                hull["a1"] * w + hull["c_ww"] * heaving + hull["c_wq"] * q + hull["b1"] * plane,
+                hull["a2"] * q
+                + hull["c_qq"] * turning
+                + hull["a3"] * np.sin(theta)
+                + hull["c_qw"] * w
+                + hull["b2"] * plane,
                 q,
                 w * np.cos(theta) - 1.5 * np.sin(theta),
             ]
 
         x = solve_ivp(rate, (0.0, h), x, rtol=1e-8, atol=1e-10).y[:, -1]
     return Recording(
-        name="unstable.csv",
+        name="hull.csv",
         sha256="0" * 64,
         time=np.arange(rows) * h,
         depth=states[3] + 0.008 * rng.standard_normal(rows),
@@ -62,7 +89,7 @@ def search_of(workers: Workers, fitter: Fitter) -> Search:
 
 
 def test_what_a_free_run_cannot_find_is_found_while_the_measurements_steer() -> None:
-    fitter = Fitter([unstable_dive(is_weakened=True)])
+    fitter = Fitter([dive(SHORT, is_weakened=True)])
     assert fitter.excess(fitter.root.fit) > 100.0  # a linear hull has nothing to do with it
     with Workers(fitter, 1) as workers:
         found = continued(search_of(workers, fitter), NAMES, most_beside=3)
@@ -76,7 +103,7 @@ def test_what_a_free_run_cannot_find_is_found_while_the_measurements_steer() -> 
 
 
 def test_where_nothing_else_acts_nothing_joins() -> None:
-    fitter = Fitter([unstable_dive(is_weakened=False)])
+    fitter = Fitter([dive(SHORT)])
     with Workers(fitter, 1) as workers:
         found = continued(search_of(workers, fitter), NAMES, most_beside=3)
     assert found is not None
@@ -84,8 +111,20 @@ def test_where_nothing_else_acts_nothing_joins() -> None:
     assert fitter.excess(fitter.polished(found).fit) < 1.15
 
 
+def test_a_long_hull_that_meets_the_water_differently_at_either_end() -> None:
+    fitter = Fitter([dive(LONG, drag=along_the_hull)])
+    with Workers(fitter, 1) as workers:
+        found = continued(search_of(workers, fitter), NAMES, most_beside=3)
+    assert found is not None
+    assert found.names == NAMES | {"drag_along_the_hull"}
+    found = fitter.polished(found)
+    values = dict(zip(found.fit.structure.names, found.fit.parameters, strict=True))
+    assert fitter.excess(found.fit) < 1.15
+    assert values["drag_half_length"] == pytest.approx(HALF_LENGTH, rel=0.15)
+
+
 def test_a_recording_that_the_filter_loses_has_no_continuation(monkeypatch: pytest.MonkeyPatch) -> None:
-    fitter = Fitter([unstable_dive(is_weakened=False)])
+    fitter = Fitter([dive(SHORT)])
     monkeypatch.setattr(module, "_steered", lambda *_: [])
     with Workers(fitter, 1) as workers:
         assert continued(search_of(workers, fitter), NAMES, most_beside=3) is None
