@@ -17,7 +17,7 @@ from host.catalogue import named, structure_of
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import first_guess
 from host.diagnosis.margins import LITTLE, NAMING_MARGIN
-from host.diagnosis.prospects import probed
+from host.diagnosis.prospects import gain, probed
 from host.diagnosis.starts import with_other_moments
 from host.filter_error import filter_error_from
 from host.gauss_newton import Point
@@ -112,7 +112,10 @@ def _best_of_each(found: list[Explanation]) -> list[Explanation]:
 
 def _larger(search: "Search", parent: Explanation, most: int) -> list[Explanation]:
     """The set with one effect more, of those that promise most under these forces."""
-    gains = search.gains(parent)
+    # What a free run made of an effect alone is no start here, so each is foretold from its own probes.
+    names = search.candidates(parent)
+    ahead = search.workers.results([(gain, (parent, name, [], True)) for name in names])
+    gains = dict(zip(names, ahead, strict=True))
     names = sorted(gains, key=lambda name: -gains[name])[:most]
     return _steered(search, [start for name in names for start in _starts(search, parent, name)])
 

@@ -141,7 +141,7 @@ class Search:
         self, parent: Explanation, is_thorough: bool = True, among: set[str] | None = None
     ) -> dict[str, float]:
         """Twice the log-likelihood each effect could gain on top of the parent, predicted."""
-        others = [name for name in self._candidates(parent) if among is None or name in among]
+        others = [name for name in self.candidates(parent) if among is None or name in among]
         found = self.workers.results(
             [(gain, (parent, name, self.values(name), is_thorough)) for name in others]
         )
@@ -236,7 +236,7 @@ class Search:
         against its own coefficients, would gain once all of them are free; so until little is left these
         are always tried, unless all at once.
         """
-        others = self._candidates(parent)
+        others = self.candidates(parent)
         if size == 1 and not self.root.fit.has_process_noise:
             return others
         gains = self.gains(parent, is_leading)
@@ -275,7 +275,7 @@ class Search:
         """Whether much is left although all that every vehicle has was tried at once."""
         return bool(self.joint) and self.fitter.excess(best.fit) > MUCH
 
-    def _candidates(self, parent: Explanation) -> list[str]:
+    def candidates(self, parent: Explanation) -> list[str]:
         """What may join a set: the offsets only once the free trim, which does their work, has gone.
 
         What changes other terms joins these; and where the plane was before, once it matters.

@@ -42,10 +42,10 @@ def along_the_hull(w: float, q: float) -> tuple[float, float]:
     return float(np.mean(local)), float(-4.0 / HALF_LENGTH**3 * np.mean(y * local))
 
 
-def dive(hull: Hull, drag: Drag = two_drags, is_weakened: bool = False) -> Recording:
+def dive(hull: Hull, drag: Drag = two_drags, rows: int = 900, is_weakened: bool = False) -> Recording:
     """Integrated by scipy; speed measured, constant. From 70 s on the plane has lost two fifths, if so."""
     rng = np.random.default_rng(3)
-    h, rows = 0.1, 1400
+    h = 0.1
     rudder, at = np.zeros(rows), 30
     while at < rows:
         until = at + int(rng.uniform(15, 50))
@@ -89,7 +89,7 @@ def search_of(workers: Workers, fitter: Fitter) -> Search:
 
 
 def test_what_a_free_run_cannot_find_is_found_while_the_measurements_steer() -> None:
-    fitter = Fitter([dive(SHORT, is_weakened=True)])
+    fitter = Fitter([dive(SHORT, rows=1400, is_weakened=True)])
     assert fitter.excess(fitter.root.fit) > 100.0  # a linear hull has nothing to do with it
     with Workers(fitter, 1) as workers:
         found = continued(search_of(workers, fitter), NAMES, most_beside=3)
@@ -112,7 +112,7 @@ def test_where_nothing_else_acts_nothing_joins() -> None:
 
 
 def test_a_long_hull_that_meets_the_water_differently_at_either_end() -> None:
-    fitter = Fitter([dive(LONG, drag=along_the_hull)])
+    fitter = Fitter([dive(LONG, drag=along_the_hull, rows=1400)])
     with Workers(fitter, 1) as workers:
         found = continued(search_of(workers, fitter), NAMES, most_beside=3)
     assert found is not None
