@@ -101,15 +101,28 @@ class _Scoring(Generic[P]):
 
     d log L = 1/2 sum_k [e^T S^-1 dS S^-1 e - tr(S^-1 dS) - 2 e^T S^-1 de]
     F_ij = sum_k [1/2 tr(S^-1 d_i S S^-1 d_j S) + d_i e^T S^-1 d_j e]
+
+    A level that loses the recording where it is moved stays as it is.
     """
 
     def __init__(self, here: Place[P], model: NoiseModel[P]) -> None:
         self.noise, self.model = here.point.noise, model
         levels = self.noise.size
         self.score, self.information = np.zeros(levels), np.zeros((levels, levels))
-        moved = [
-            model.passes(here.point.with_noise(self._moved(DIFFERENCE * unit))) for unit in np.eye(levels)
-        ]
+        with np.errstate(all="ignore"):
+            self._add_up(
+                here,
+                [
+                    model.passes(here.point.with_noise(self._moved(DIFFERENCE * one)))
+                    for one in np.eye(levels)
+                ],
+            )
+        lost = ~np.isfinite(self.score) | ~np.isfinite(np.diag(self.information))
+        self.score[lost] = 0.0
+        self.information[lost, :] = self.information[:, lost] = 0.0
+        self.information[lost, lost] = 1.0
+
+    def _add_up(self, here: Place[P], moved: list[list[P]]) -> None:
         for k, run in enumerate(here.passes):
             de = np.array([(passes[k].error - run.error) / DIFFERENCE for passes in moved])
             dS = np.array([(passes[k].variance - run.variance) / DIFFERENCE for passes in moved])

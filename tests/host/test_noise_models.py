@@ -1,5 +1,6 @@
 """The noise models of the bench against dense algebra, and against recordings made to mistake them."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -7,11 +8,12 @@ import pytest
 from exact_dive import TABLE_1, Dive, fly
 from scipy.signal import lfilter
 
-from host.ascent import place
+from host.ascent import _Scoring, place
 from host.coloured_noise import WanderingSensors, coloured_noise
 from host.filter_error import RandomForces, filter_error
 from host.gauss_newton import Point
 from host.identify import identify
+from host.kalman import KalmanPass
 from host.maximum_likelihood import fit_maximum_likelihood
 from host.propagate import free_run, inputs_of
 from host.uncertainty import covariance
@@ -197,3 +199,24 @@ def test_wandering_is_told_and_kept_in_the_model() -> None:
     assert any(note.startswith("The sensors' errors wander") and "depth" in note for note in result.notes)
     assert result.model.noise["depth_wander_m"] == pytest.approx(0.03, rel=0.3)
     assert result.model.noise["depth_wander_s"] == pytest.approx(2.0, rel=0.5)
+
+
+def test_a_noise_level_that_loses_the_recording_where_it_is_moved_stays() -> None:
+    recording, states = fly(Dive(duration=6.0))
+    inputs, noise = inputs_of(recording), np.array([3e-6, 1e-4, 1e-3, 1e-3])
+
+    class Brittle(RandomForces):
+        def passes(self, point: Point) -> list[KalmanPass]:
+            runs = super().passes(point)
+            if point.noise[3] == noise[3]:
+                return runs
+            return [replace(run, variance=np.full_like(run.variance, np.inf)) for run in runs]
+
+    model = Brittle([inputs])
+    here = place(Point(inputs.structure, TRUTH, [states[:, 0]], noise), model)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        moved = _Scoring(here, model).trial(1e-3)
+    assert moved[3] == noise[3]
+    assert np.isfinite(moved).all()
+    assert (moved[:3] != noise[:3]).all()
