@@ -74,5 +74,7 @@ def _errors_passing(explanation: Explanation, spans: Spans) -> list[Array]:
     for run, unseen, initial in zip(spans.teaching, spans.unseen, fit.initial, strict=True):
         with np.errstate(over="ignore", invalid="ignore"):
             passed = free_run(fit.parameters, initial, inputs_of(run, fit.structure))
-        errors.append(np.vstack([unseen.pitch, unseen.depth]) - passed.outputs)
+        # A run that leaves the numbers is as far off as can be, not only as far as it can be followed.
+        outputs = np.where(np.isfinite(passed.outputs), passed.outputs, np.inf)
+        errors.append(np.vstack([unseen.pitch, unseen.depth]) - outputs)
     return errors
