@@ -98,6 +98,12 @@ class Chain:
     sensed_pitch: ca.SX = field(default_factory=lambda: ca.SX(0))
     sensed_depth: ca.SX = field(default_factory=lambda: ca.SX(0))
 
+    @property
+    def turning(self) -> ca.SX:
+        """The base model's q', rad/s^2, without what is added to it."""
+        p, ratio = self.p, self.speed_ratio
+        return p["a2"] * ratio * self.q + p["a3"] * self.theta + p["b2"] * ratio**2 * self.plane
+
 
 Term = Callable[[Chain], None]
 
@@ -237,11 +243,7 @@ class Structure:
         own = [chain.rates.get(name, ca.SX(0)) for name in self.states[len(STATES) :]]
         return ca.vertcat(
             p["a1"] * ratio * chain.w + p["b1"] * ratio**2 * chain.plane + p["heave_offset"] + chain.heave,
-            p["a2"] * ratio * chain.q
-            + p["a3"] * chain.theta
-            + p["b2"] * ratio**2 * chain.plane
-            + p["pitch_offset"]
-            + chain.pitch,
+            chain.turning + p["pitch_offset"] + chain.pitch,
             chain.q,
             chain.w - chain.speed * chain.theta + chain.climb,
             *own,

@@ -27,8 +27,7 @@ def _ballast(c: Chain) -> None:
 
 
 def _acceleration(c: Chain) -> None:
-    turning = c.p["a2"] * c.speed_ratio * c.q + c.p["a3"] * c.theta + c.p["b2"] * c.speed_ratio**2 * c.plane
-    c.heave += c.p["c_wa"] * turning
+    c.heave += c.p["c_wa"] * c.turning
 
 
 EFFECTS = (

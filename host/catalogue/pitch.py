@@ -42,10 +42,7 @@ def _pendulum(c: Chain) -> None:
     c.pitch += c.p["pendulum_share"] * c.p["a3"] / GRAVITY * (c.surge + c.q * c.w)
     c.heave += c.p["pendulum_lever"] * c.q**2
     if "speed_loss" in c.rates:
-        turning = (
-            c.p["a2"] * c.speed_ratio * c.q + c.p["a3"] * c.theta + c.p["b2"] * c.speed_ratio**2 * c.plane
-        )
-        c.rates["speed_loss"] -= c.p["c_uq"] * c.p["pendulum_lever"] * (turning + c.pitch)
+        c.rates["speed_loss"] -= c.p["c_uq"] * c.p["pendulum_lever"] * (c.turning + c.pitch)
 
 
 EFFECTS = (

@@ -89,13 +89,13 @@ def _joint(search: "Search", leading: Explanation) -> Explanation:
     """All that every vehicle has: by continuation, which needs no set to begin with, or joining one."""
     names = frozenset({*ORDINARY, FREE_TRIM.name, PLANE_BEFORE.name})
     found = continued(search, names, MOST_BESIDE)
-    ends: list[Explanation] = []
-    if found is not None:
-        ends.append(search.remember(search.fitter.polished(found)))
-        search.joint.add(found.names)
-    if not any(search.fitter.excess(end.fit) < LITTLE for end in ends):
-        ends.append(with_ordinary(search, leading))
-    return min(ends, key=lambda e: e.bic)
+    if found is None:
+        return with_ordinary(search, leading)
+    end = search.remember(search.fitter.polished(found))
+    search.joint.add(end.names)
+    if search.fitter.excess(end.fit) < LITTLE:
+        return end
+    return min(end, with_ordinary(search, leading), key=lambda e: e.bic)
 
 
 def _more(search: "Search", best: Explanation) -> list[Task]:
