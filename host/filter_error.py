@@ -59,10 +59,18 @@ def filter_error_from(
     return finished(end.point, white, inputs, free, end.likelihood, used, converged)
 
 
-def whitened_innovations(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:
-    """The filter's innovations over their deviation (2, N), and their sensitivities at fixed gain."""
+def whitened_innovations(
+    point: Point, inputs: list[Inputs], has_slopes: bool = True
+) -> list[tuple[Array, Array]]:
+    """The filter's innovations over their deviation (2, N), and their sensitivities at fixed gain.
+
+    has_slopes  or without the sensitivities, (2, 0, N)
+    """
     model = RandomForces(inputs)
-    return model.whitened(point, model.passes(point))
+    passes = model.passes(point)
+    if has_slopes:
+        return model.whitened(point, passes)
+    return [whiten(run.error, np.empty((2, 0, run.error.shape[1])), run.variance) for run in passes]
 
 
 def _first_noise(start: Fit, inputs: list[Inputs]) -> Array:

@@ -22,9 +22,12 @@ ALIKE = 0.95  # of the largest gain predicted
 POLISHED = 3
 
 
-def exchanged(search: "Search", best: Explanation) -> Explanation:
-    """The best set with one member exchanged for another, where that is better still; else itself."""
-    fewer = search.each_without(best, sorted(best.names))
+def exchanged(search: "Search", best: Explanation, settled: Names = frozenset()) -> Explanation:
+    """The best set with one member exchanged for another, where that is better still; else itself.
+
+    settled  members that were not exchanged when they could be
+    """
+    fewer = search.each_without(best, sorted(best.names - settled))
     tasks: dict[Names, Task] = {}
     is_small, is_large = len(best.names) <= SMALL, len(best.names) > LARGEST_SET
     for smaller in fewer:
@@ -37,8 +40,8 @@ def exchanged(search: "Search", best: Explanation) -> Explanation:
         kin &= gains.keys()
         rivals |= kin if is_small else {name for name in kin if _is_close_kin(name, member)}
         for name in sorted(rivals - best.names):
-            beside = best if name in kin else None
-            fits = (Fitter.grown, (smaller, name, search.values(name), beside))
+            beside, goal = best if name in kin else None, best.fit if is_large else None
+            fits = (Fitter.grown, (smaller, name, search.values(name), beside, goal))
             tasks.setdefault(smaller.names | {name}, fits)
         if member in OFFSETS and not is_large:
             kept = smaller.names & {*OFFSETS}

@@ -13,6 +13,7 @@ from host.diagnosis.absence import one_step_without
 from host.diagnosis.charges import charged_bic
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations
+from host.diagnosis.margins import LARGEST_SET
 from host.diagnosis.spans import ALARM_LATE
 from host.diagnosis.starts import guess, idle, is_far, scanned, starts_again, starts_of
 from host.diagnosis.trims import HELD, trimmed
@@ -104,7 +105,12 @@ class Fitter:
         return float(np.max(fit.noise[:2] / self.floor))
 
     def grown(
-        self, parent: Explanation, name: str, values: list[Array], rival: Explanation | None = None
+        self,
+        parent: Explanation,
+        name: str,
+        values: list[Array],
+        rival: Explanation | None = None,
+        goal: Fit | None = None,
     ) -> Explanation:
         """The parent's set with one effect more, from the two most promising of its start values.
 
@@ -114,20 +120,21 @@ class Fitter:
         values  start values of the effect's parameters from elsewhere, beside its own probes
         rival   the parent's set with another effect that does the same work: a start there, too, as the
                 coefficients of a parent without either may be bent into another valley
+        goal    a fit: a search is given up where it would not get as far
         """
         starts = starts_of(self, parent, name, values, rival)
-        fit = self.fitted(starts)
+        fit = self.fitted(starts, goal)
         if parent.fit.has_process_noise:
             return self.explained(parent.names | {name}, fit)
         again = starts_again(self, parent, name, values, self.explained(parent.names | {name}, fit))
-        others = [self.fitted([start], fit, PATIENT_ITERATIONS) for start in again]
+        others = [self.fitted([start], goal or fit, PATIENT_ITERATIONS) for start in again]
         fit = max([fit, *others], key=plausibility)
         if named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
             fit = self.fitted([idle(starts[0], name)])
         return self.explained(parent.names | {name}, fit)
 
     def shrunk(self, parent: Explanation, *members: str) -> Explanation:
-        """The parent's set without some of its effects; not polished."""
+        """The parent's set without some of its effects; not polished, and of a large set not if far off."""
         names = parent.names - {*members}
         start = self.point(names, parent)
         ahead = one_step_without(parent.fit, *map(named, members))
@@ -138,7 +145,8 @@ class Fitter:
         starts = [start]
         if is_far(self, parent):
             starts.append(guess(self, start, names))
-        return self.explained(names, self.fitted(starts))
+        goal = parent.fit if len(parent.names) > LARGEST_SET else None
+        return self.explained(names, self.fitted(starts, goal))
 
     def reduced(self, explanation: Explanation, names: Names) -> Explanation:
         """The set with these members only."""

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 PROMISING = 2  # forms beside a set that are fitted in earnest
 FAIR_PART = 0.3  # of what a member was worth, that a form in its place must promise: predictions are local
+HOPELESS = 5.0  # times the noise floor, that a form beside one effect leaves: another is not enough, either
 ONE_SIDED = {"heave_quadratic_drag": "unknown_force_w_w", "pitch_quadratic_damping": "unknown_moment_q_q"}
 """Entries that are half of a drag which differs up and down, and the forms that are the other half."""
 
@@ -37,6 +38,8 @@ def lone_form(search: "Search", leading: Explanation) -> Explanation | None:
     best: Explanation = min([leading, *grown], key=lambda e: e.bic)
     if _is_enough(search, best, leading):
         return best
+    if search.fitter.excess(best.fit) > HOPELESS:
+        return None
     tasks = [task for e in grown for task in _with_one_more(search, e)]
     alone = {name: search.tried.get(search.root.names | {name}) for name in ONE_SIDED}
     tasks += [search.growth(e, ONE_SIDED[name]) for name, e in alone.items() if e is not None]

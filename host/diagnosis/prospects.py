@@ -107,16 +107,19 @@ def probed(
 
 
 def whitened_at(
-    point: Point, inputs: list[Inputs], parent: Explanation
+    point: Point, inputs: list[Inputs], parent: Explanation, has_slopes: bool = True
 ) -> tuple[list[tuple[Array, Array]], float]:
-    """Innovations and sensitivities under the parent's noise, and the deviance: inf if lost."""
+    """Innovations and sensitivities under the parent's noise, and the deviance: inf if lost.
+
+    has_slopes  or without the sensitivities, where those of a point nearby will do; not in waves
+    """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if parent.fit.waves.any():
             white = whitened_in_waves(point, inputs)
         elif parent.fit.has_process_noise:
-            white = whitened_innovations(point, inputs)
+            white = whitened_innovations(point, inputs, has_slopes)
         else:
-            white, deviance = residuals_at(point, inputs)
+            white, deviance = residuals_at(point, inputs, has_slopes)
         if parent.fit.has_process_noise:
             deviance = sum(float(np.sum(e**2)) for e, _ in white)
         return white, np.inf if diverges(white, inputs, 1e3) else deviance

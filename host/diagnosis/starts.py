@@ -19,6 +19,7 @@ from host.diagnosis.margins import LARGEST_SET
 from host.diagnosis.prospects import probed, whitened_at
 from host.gauss_newton import GaussNewton, Mask, Point
 from host.output_error import annealed, free_run_cost
+from host.propagate import Inputs
 from host.recording import Array
 from host.valleys import A2, A3, B2, SHARING_POLES, has_usual_heave, look_alikes, with_usual_heave
 
@@ -104,19 +105,31 @@ def with_other_moments(fitter: "Fitter", end: Explanation) -> list[Point]:
         if name not in fit.structure.moments or not fit.free[k]:
             continue
         others = fit.free & (np.arange(fit.free.size) != k)
-
-        def foretold(point: Point, others: Mask = others) -> float:
-            white, cost = whitened_at(point, inputs, end)
-            return GaussNewton(white, point, others).predicted_cost(cost) if np.isfinite(cost) else inf
-
-        best, reach = at, NEAR_A_MOMENT * (fitter.held[LAST] - fitter.held[FIRST])
+        best, least, reach = at, inf, NEAR_A_MOMENT * (fitter.held[LAST] - fitter.held[FIRST])
         for count in NEARBY:
             shifts = np.linspace(-reach, reach, count)
             near = [_with_value(best, k, best.parameters[k] + shift) for shift in shifts]
-            best, reach = min(near, key=foretold), 2.0 * reach / count
-        if foretold(best) < fit.deviance - CLEARLY:
+            foretold = _foretold(near, best, others, inputs, end)
+            nearest = int(np.argmin(foretold))
+            best, least, reach = near[nearest], foretold[nearest], 2.0 * reach / count
+        if least < fit.deviance - CLEARLY:
             starts.append(best)
     return starts
+
+
+def _foretold(
+    points: list[Point], among: Point, others: Mask, inputs: list[Inputs], end: Explanation
+) -> list[float]:
+    """The deviance at each point, all else one step ahead with the sensitivities of one among them."""
+    slopes, cost = whitened_at(among, inputs, end)
+    if not np.isfinite(cost):
+        return [inf] * len(points)
+    costs = []
+    for point in points:
+        white, cost = whitened_at(point, inputs, end, has_slopes=False)
+        seen = [(error, S) for (error, _), (_, S) in zip(white, slopes, strict=True)]
+        costs.append(GaussNewton(seen, point, others).predicted_cost(cost) if np.isfinite(cost) else inf)
+    return costs
 
 
 def _with_value(point: Point, k: int, value: float) -> Point:

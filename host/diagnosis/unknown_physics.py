@@ -23,6 +23,7 @@ MOST_TOLD = 3  # coefficients that a sentence can hold
 def with_unknown(search: Search, best: Explanation) -> Explanation:
     """The best explanation with forms of unknown physics in it, or more effects, if these pay."""
     search.on_progress("physics outside the catalogue")
+    settled = best.names
     for _ in range(_rounds(search, best)):
         grown = _grown(search, best)
         # Of a large set each member costs a long fit to try without: that waits until all have joined.
@@ -36,7 +37,7 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
     best = pruned(search, best)
     if search.part is not None or search.is_hopeless(best) or _is_left_open(search, best):
         return best
-    return exchanged(search, completed(search, best))
+    return exchanged(search, completed(search, best), settled)
 
 
 def _is_left_open(search: Search, best: Explanation) -> bool:

@@ -77,3 +77,19 @@ def test_what_acts_on_pitch_is_tried_in_the_place_of_a_moment(fitter: Fitter) ->
         tried = {name for names in search.tried if len(names) == 1 for name in names}
         assert on_pitch >= {"pitch_quadratic_damping", "large_angle_restoring", "trim_moment"}
         assert on_pitch <= tried
+
+
+def test_what_was_exchanged_before_is_not_exchanged_again() -> None:
+    fitter = Fitter([hidden_dive(duration=40.0)])
+    names = frozenset({"net_buoyancy", "heave_quadratic_drag"})
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        best = fitter.base
+        for name in sorted(names):
+            best = fitter.grown(best, name, [])
+        search.remember(fitter.polished(best))
+        exchanged(search, best, settled=names)
+        assert search.tried.keys() == {names}
+        exchanged(search, best, settled=frozenset({"net_buoyancy"}))
+        assert len(search.tried) > 2
+        assert all("net_buoyancy" in tried for tried in search.tried if len(tried) == len(names))

@@ -1,6 +1,7 @@
 """Where fits of sets begin: at the likeliest moment, in every valley that a lag or a bent base may hide."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,8 +11,9 @@ from host.catalogue import named, structure_of
 from host.diagnosis.deviations import deviations
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.prospects import probed
+from host.diagnosis.prospects import probed, whitened_at
 from host.diagnosis.starts import SLUGGISH, with_other_moments, with_usual_heave, with_usual_pitch
+from host.fit import Fit
 from host.gauss_newton import Point
 from host.output_error import output_error
 from host.propagate import free_run, inputs_of
@@ -98,6 +100,43 @@ def test_a_fit_that_ended_in_another_rest_of_the_plane_begins_again_at_the_right
     (again,) = with_other_moments(fitter, stuck)
     assert fitter.carried_on(again).parameters[-1] == pytest.approx(WEAKENED_AT, abs=0.1)
     assert with_other_moments(fitter, right) == []
+
+
+def test_a_search_far_below_its_goal_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    def lamed(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+        lost = -0.5 * plane * (time > WEAKENED_AT)
+        return lost * BASE["b1"], lost * BASE["b2"], 0.0
+
+    def counted(*arguments: Any) -> Fit:
+        spent.append(output_error(*arguments))
+        return spent[-1]
+
+    fitter = Fitter([hidden_dive(lamed)])
+    right = fitter.polished(fitter.grown(fitter.base, "rudder_effectiveness_change", []))
+    monkeypatch.setattr("host.diagnosis.fitter.output_error", counted)
+    iterations = {}
+    for goal in (None, right.fit):
+        spent: list[Fit] = []
+        found = fitter.grown(fitter.base, "pitch_quadratic_damping", [], None, goal)
+        assert found.fit.log_likelihood < right.fit.log_likelihood - 1000.0
+        iterations[goal is None] = sum(fit.iterations for fit in spent)
+    assert iterations[False] < 0.5 * iterations[True]
+    again = fitter.grown(fitter.base, "rudder_effectiveness_change", [], None, right.fit)
+    assert again.bic < right.bic + 1.0
+
+
+@pytest.mark.parametrize("has_forces", [False, True])
+def test_residuals_are_the_same_without_their_slopes(has_forces: bool) -> None:
+    fitter = Fitter([hidden_dive(duration=20.0)])
+    fit = fitter.base.fit
+    noise = np.array([*fit.noise[:2], 1e-4, 1e-4]) if has_forces else fit.noise
+    explanation = replace(fitter.base, fit=replace(fit, noise=noise))
+    point, inputs = fitter.point(frozenset(), explanation), fitter.inputs(frozenset(), has_forces)
+    full, cost = whitened_at(point, inputs, explanation)
+    short, same = whitened_at(point, inputs, explanation, has_slopes=False)
+    assert same == pytest.approx(cost)
+    np.testing.assert_allclose(short[0][0], full[0][0], atol=1e-9)
+    assert short[0][1].shape == (2, 0, full[0][0].shape[1])
 
 
 def test_a_moment_at_which_the_plane_rested_may_be_anywhere_in_that_rest() -> None:
