@@ -13,7 +13,6 @@ from host.diagnosis.absence import one_step_without
 from host.diagnosis.charges import charged_bic
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations
-from host.diagnosis.margins import LARGEST_SET
 from host.diagnosis.spans import ALARM_LATE
 from host.diagnosis.starts import guess, idle, is_far, scanned, starts_again, starts_of
 from host.diagnosis.trims import HELD, trimmed
@@ -134,7 +133,7 @@ class Fitter:
         return self.explained(parent.names | {name}, fit)
 
     def shrunk(self, parent: Explanation, *members: str) -> Explanation:
-        """The parent's set without some of its effects; not polished, and of a large set not if far off."""
+        """The parent's set without some of its effects; not polished."""
         names = parent.names - {*members}
         start = self.point(names, parent)
         ahead = one_step_without(parent.fit, *map(named, members))
@@ -145,8 +144,7 @@ class Fitter:
         starts = [start]
         if is_far(self, parent):
             starts.append(guess(self, start, names))
-        goal = parent.fit if len(parent.names) > LARGEST_SET else None
-        return self.explained(names, self.fitted(starts, goal))
+        return self.explained(names, self.fitted(starts))
 
     def reduced(self, explanation: Explanation, names: Names) -> Explanation:
         """The set with these members only."""

@@ -17,6 +17,7 @@ from host.diagnosis.search import Search
 from host.diagnosis.together import completed
 
 MOST_ROUNDS = 8
+MOST_FORMS = 3  # of unknown physics beside many effects: more tell nothing of what acts
 MOST_TOLD = 3  # coefficients that a sentence can hold
 
 
@@ -32,12 +33,15 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
         if better.bic > best.bic - margin(better):
             break
         best = better
+        if _is_large(best) and len(best.names & UNKNOWN.keys()) == MOST_FORMS:
+            break
     if not _is_large(best):
         return best
     best = pruned(search, best)
     if search.part is not None or search.is_hopeless(best) or _is_left_open(search, best):
         return best
-    return exchanged(search, completed(search, best), settled)
+    best = completed(search, best)
+    return best if unknown_in(best) else exchanged(search, best, settled)
 
 
 def _is_left_open(search: Search, best: Explanation) -> bool:
