@@ -6,7 +6,8 @@ forces as large as all that act, a Kalman filter follows the measurements, and t
 of a regression, with one maximum. The forces are let go in stages, the coefficients following; what they
 still make up for at some stage is shown by what an effect would gain there, and it joins (continuation, or
 homotopy: Allgower and Georg, Introduction to Numerical Continuation Methods). What is large would bend the
-rest before it seems to be lacking, so the first stage is asked at once.
+rest before it seems to be lacking, so the first stage is asked at once; and two ends are followed, as what
+seems to be lacking later may be the other one.
 """
 
 from typing import TYPE_CHECKING
@@ -31,7 +32,9 @@ ALONG_THE_HULL = "drag_along_the_hull"  # of every long hull, but of no simulato
 STAGES = tuple(10.0 ** (-k / 2) for k in range(1, 17))
 """Variance of the unknown force over that of all force."""
 UNDECIDED = 4  # stages, through which sets with an effect that gains at the first are followed side by side
-CLEARLY = 50.0  # of BIC, that each must gain by then, where nothing seems to be lacking without it
+FOLLOWED = 2  # sets, or ends of one set, from then on: that one sits in a side valley shows late
+SAME_END = 3.0  # of BIC between two fits of a set
+CLEARLY = 50.0  # of BIC, that each must gain by then and at the end, where nothing seems to be lacking
 PROMISING, MOST_PROMISING = 2, 3  # effects that are tried where one may join, and at the first stage
 PLACES = 2  # in which each of them begins
 SLIGHTLY = 1.05  # times the variance expected: enough for another look at the moments
@@ -45,17 +48,18 @@ def continued(search: "Search", names: Names, most_beside: int) -> Explanation |
     None where the filter loses the recording.
     """
     fitter, common = search.fitter, names | {ALONG_THE_HULL}
-    steered = _with_what_is_large(search, names)
+    followed = _with_what_is_large(search, names)
     for share in STAGES[UNDECIDED:]:
-        steered = _moved(search, _under(search, steered, share, STEPS))
-        while steered and _lacks(steered[0], LITTLE) and len(steered[0].names - common) < most_beside:
-            larger = _best_of_each(_larger(search, steered[0], PROMISING))[:1]
-            if not larger or larger[0].bic > steered[0].bic - NAMING_MARGIN:
+        followed = _moved(search, _distinct(_under(search, followed, share, STEPS)))
+        while followed and _lacks(followed[0], LITTLE) and len(followed[0].names - common) < most_beside:
+            larger = _best_of_each(_larger(search, followed[0], PROMISING))[:1]
+            if not larger or larger[0].bic > followed[0].bic - NAMING_MARGIN:
                 break
-            steered = _moved(search, larger)
-    if not steered:
+            followed = [*_moved(search, larger), *followed][:FOLLOWED]
+    if not followed:
         return None
-    return fitter.explained(steered[0].names, fitter.fitted([_forced(fitter, _at(steered[0]), 0.0)]))
+    best = min(followed, key=_charged)
+    return fitter.explained(best.names, fitter.fitted([_forced(fitter, _at(best), 0.0)]))
 
 
 def _with_what_is_large(search: "Search", names: Names) -> list[Explanation]:
@@ -71,10 +75,15 @@ def _with_what_is_large(search: "Search", names: Names) -> list[Explanation]:
     followed = [*plain, *along]
     for parents in (plain, _best_of_each(along)):
         larger = [end for parent in parents for end in _larger(search, parent, MOST_PROMISING)]
-        followed += _best_of_each(larger)[:MOST_PROMISING]
+        kept = {one.names for one in _best_of_each(larger)[:MOST_PROMISING]}
+        followed += _distinct([one for one in larger if one.names in kept])
     for share in STAGES[1:UNDECIDED]:
-        followed = _best_of_each(_under(search, followed, share))
-    return sorted(followed, key=lambda one: one.bic + CLEARLY * len(one.names))[:1]
+        followed = _distinct(_under(search, followed, share))
+    return sorted(followed, key=_charged)[:FOLLOWED]
+
+
+def _charged(one: Explanation) -> float:
+    return one.bic + CLEARLY * len(one.names)
 
 
 def _speeds(fitter: "Fitter") -> list[float]:
@@ -110,6 +119,15 @@ def _best_of_each(found: list[Explanation]) -> list[Explanation]:
     return list(best.values())
 
 
+def _distinct(found: list[Explanation]) -> list[Explanation]:
+    """The likeliest first, each end of a set once."""
+    ends: list[Explanation] = []
+    for one in sorted(found, key=lambda one: one.bic):
+        if all(one.names != end.names or one.bic > end.bic + SAME_END for end in ends):
+            ends.append(one)
+    return ends
+
+
 def _larger(search: "Search", parent: Explanation, most: int) -> list[Explanation]:
     """The set with one effect more, of those that promise most under these forces."""
     # What a free run made of an effect alone is no start here, so each is foretold from its own probes.
@@ -131,7 +149,7 @@ def _moved(search: "Search", steered: list[Explanation]) -> list[Explanation]:
     """The likeliest, its moments in another rest of the plane where as the forces fall that is likelier."""
     if not steered or not _lacks(steered[0], SLIGHTLY):
         return steered
-    return _best_of_each([*steered, *_steered(search, with_other_moments(search.fitter, steered[0]))])
+    return _distinct([*steered, *_steered(search, with_other_moments(search.fitter, steered[0]))])[:FOLLOWED]
 
 
 def _at(steered: Explanation) -> Point:
