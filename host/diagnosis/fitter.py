@@ -129,7 +129,7 @@ class Fitter:
         others = [self.fitted([start], goal or fit, PATIENT_ITERATIONS) for start in again]
         fit = max([fit, *others], key=plausibility)
         if named(name).size_names and fit.log_likelihood < parent.fit.log_likelihood - ROUGHLY:
-            fit = self.fitted([idle(starts[0], name)])
+            fit = self.fitted([idle(starts[0], name)], goal)
         return self.explained(parent.names | {name}, fit)
 
     def shrunk(self, parent: Explanation, *members: str) -> Explanation:
