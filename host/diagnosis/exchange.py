@@ -25,7 +25,7 @@ POLISHED = 3
 def exchanged(search: "Search", best: Explanation, settled: Names = frozenset()) -> Explanation:
     """The best set with one member exchanged for another, where that is better still; else itself.
 
-    settled  members that were not exchanged when they could be
+    settled  members that stay: they were tried against all others before
     """
     fewer = search.each_without(best, sorted(best.names - settled))
     tasks: dict[Names, Task] = {}

@@ -33,7 +33,7 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
         if better.bic > best.bic - margin(better):
             break
         best = better
-        if _is_large(best) and len(best.names & UNKNOWN.keys()) == MOST_FORMS:
+        if _is_large(best) and len(_forms_in(best)) == MOST_FORMS:
             break
     if not _is_large(best):
         return best
@@ -41,12 +41,12 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
     if search.part is not None or search.is_hopeless(best) or _is_left_open(search, best):
         return best
     best = completed(search, best)
-    return best if unknown_in(best) else exchanged(search, best, settled)
+    return best if _forms_in(best) else exchanged(search, best, settled)
 
 
 def _is_left_open(search: Search, best: Explanation) -> bool:
     """Whether a form of unknown physics is needed and is not enough: then no exchange makes names certain."""
-    return bool(best.names & UNKNOWN.keys()) and search.fitter.excess(best.fit) > LITTLE
+    return bool(_forms_in(best)) and search.fitter.excess(best.fit) > LITTLE
 
 
 def _rounds(search: Search, best: Explanation) -> int:
@@ -63,11 +63,15 @@ def unknown_in(explanation: Explanation) -> list[str]:
     fit = explanation.fit
     values = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
     said = []
-    for form in (UNKNOWN[name] for name in sorted(explanation.names & UNKNOWN.keys())):
+    for form in (UNKNOWN[name] for name in _forms_in(explanation)):
         listed = [f"{p.name} = {values[p.name]:.3g} {p.unit}" for p in form.parameters]
         told = f"; {', '.join(listed)}" if len(listed) <= MOST_TOLD else ""
         said.append(f"{form.sentence[:-1]} ({form.equation}{told}).")
     return said
+
+
+def _forms_in(explanation: Explanation) -> list[str]:
+    return sorted(explanation.names & UNKNOWN.keys())
 
 
 def known_in(explanation: Explanation) -> list[str]:
