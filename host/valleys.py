@@ -38,6 +38,7 @@ USUAL_DAMPING, DAMPING_FACTOR = -1.0, 5.0  # 1/s, of a1; gliders 0.1, small quic
 INSTANT, IDLE = -10.0, -0.1
 A1, A2, A3, B1, B2, U0 = (NAMES.index(name) for name in ("a1", "a2", "a3", "b1", "b2", "u0"))
 LAGS, DEPTH_LAG, MUNK, COUPLING = ("lag_time", "pitch_lag_time"), "depth_lag_time", "c_qw", "c_wq"
+MOMENTS = ("b2", "pitch_offset", MUNK, "c_qq", "c_q0", "trim_pitch")  # what turns, or brakes, the hull
 SHARING_POLES = (*LAGS, DEPTH_LAG, MUNK)  # parameters of effects that bring a pole of their own
 
 
@@ -111,8 +112,8 @@ def with_force_mirrored(point: Point) -> list[Point]:
 def with_poles_swapped(point: Point) -> list[Point]:
     """The point with a real pole of pitch in the place of a lag's or of heave's, and the other way round.
 
-    A lag in series keeps the gain: the product of both is the same to the sensor of pitch. Where heave turns
-    the hull (Munk), pitch follows from the plane by [b2 (s - a1) + c_qw b1] / [(s - a1) (s^2 - a2 s - a3)],
+    A lag in series keeps the gain: the product of both is the same to the sensor of pitch, if all that turns
+    the hull grows with its restoring. Where heave turns it (Munk), pitch follows from the plane by [b2 (s - a1) + c_qw b1] / [(s - a1) (s^2 - a2 s - a3)],
     and c_qw makes up for another a1. Only depth, or the plane's own motion, tells these apart.
     """
     names, values = list(point.structure.names), point.parameters
@@ -120,12 +121,12 @@ def with_poles_swapped(point: Point) -> list[Point]:
     poles = np.roots([1.0, -a2, -a3])
     if np.abs(poles.imag).max() > NEARLY_REAL * np.abs(poles.real).max() or poles.real.max() >= 0.0:
         return []
-    swapped = []
+    swapped, moments = [], np.isin(names, MOMENTS)
     for pole, stays in (poles.real, poles.real[::-1]):
         for lag in (names.index(name) for name in LAGS if name in names):
             moved = _with_pitch_poles(values, stays, -1.0 / values[lag])
             moved[lag] = -1.0 / pole
-            moved[B2] = b2 * moved[A3] / a3
+            moved[moments] *= moved[A3] / a3
             swapped.append(moved)
         if MUNK in names and a1 < 0.0 and b1 != 0.0:
             moved = _with_pitch_poles(values, stays, a1)
