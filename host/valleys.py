@@ -113,8 +113,9 @@ def with_poles_swapped(point: Point) -> list[Point]:
     """The point with a real pole of pitch in the place of a lag's or of heave's, and the other way round.
 
     A lag in series keeps the gain: the product of both is the same to the sensor of pitch, if all that turns
-    the hull grows with its restoring. Where heave turns it (Munk), pitch follows from the plane by [b2 (s - a1) + c_qw b1] / [(s - a1) (s^2 - a2 s - a3)],
-    and c_qw makes up for another a1. Only depth, or the plane's own motion, tells these apart.
+    the hull grows with its restoring. Where heave turns it (Munk), pitch follows from the plane by
+    [b2 (s - a1) + c_qw b1] / [(s - a1) (s^2 - a2 s - a3)], and c_qw makes up for another a1. Only depth, or
+    the plane's own motion, tells these apart.
     """
     names, values = list(point.structure.names), point.parameters
     a1, a2, a3, b1, b2 = values[[A1, A2, A3, B1, B2]]

@@ -43,7 +43,7 @@ def exchanged(search: "Search", best: Explanation, settled: Names = frozenset())
             beside, goal = best if name in kin else None, best.fit if is_large else None
             fits = (Fitter.grown, (smaller, name, search.values(name), beside, goal))
             tasks.setdefault(smaller.names | {name}, fits)
-        if member in OFFSETS and not is_large:
+        if member in OFFSETS:
             kept = smaller.names & {*OFFSETS}
             for name in {*OFFSETS} - best.names:
                 tasks[smaller.names | {name}] = (retrimmed, (best, kept | {name}))

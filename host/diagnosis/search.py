@@ -18,7 +18,7 @@ from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE, has_memory
 from host.catalogue.unknown import WANDERING
 from host.diagnosis.absence import promises_more
-from host.diagnosis.exchange import exchanged
+from host.diagnosis.exchange import exchanged, twins
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.lone_form import lone_form
@@ -259,16 +259,19 @@ class Search:
     def _settled(self, best: Explanation) -> Explanation:
         """Prunes and exchanges members of the set until neither helps, in the likeliest valley."""
         (best,) = self.across([best])
+        settled: Names = frozenset()
         for _ in range(MOST_ROUNDS):
             best = pruned(self, best)
             if len(best.names) > LARGEST_SET and (self.part is not None or self.is_hopeless(best)):
                 break  # exchanged there, or not worth the time
-            rival = exchanged(self, best)
+            rival = exchanged(self, best, settled)
             if rival is best:
                 break
+            if len(rival.names) > SMALL:  # once more only what had an equal before
+                settled = rival.names - {name for name in best.names if twins(self, best, name)}
+                if settled == rival.names:
+                    return rival
             best = rival
-            if len(best.names) > SMALL:
-                break
         return best
 
     def is_hopeless(self, best: Explanation) -> bool:

@@ -42,16 +42,21 @@ def test_one_offset_becomes_another_of_the_same_force_and_moment(fitter: Fitter)
     assert 0.015 < known["rudder_zero"] * known["b2"] < 0.03
 
 
-def test_each_offset_is_tried_in_the_place_of_another(fitter: Fitter) -> None:
+@pytest.mark.parametrize(
+    "others", [(), ("munk_moment", "actuator_lag", "heave_pitch_rate_coupling", "speed_loss")]
+)
+def test_each_offset_is_tried_in_the_place_of_another(fitter: Fitter, others: tuple[str, ...]) -> None:
     with Workers(fitter, 1) as workers:
         search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
-        best = search.remember(fitter.polished(fitter.grown(fitter.base, "rudder_offset", [])))
-        better = exchanged(search, best)
+        best = fitter.polished(fitter.grown(fitter.base, "rudder_offset", []))
+        for name in others:
+            best = fitter.grown(best, name, [])
+        better = exchanged(search, search.remember(best), frozenset(others))
         offsets = ("trim_moment", "pitch_bias", "net_buoyancy", "vertical_current")
-        assert all(frozenset({name}) in search.tried for name in offsets)
+        assert all(frozenset({name, *others}) in search.tried for name in offsets)
         assert better.bic <= best.bic
-        told = {*better.names, *twins(search, better, next(iter(better.names)))}
-        assert "trim_moment" in told
+        offset = next(iter(better.names - {*others}))
+        assert "trim_moment" in {*better.names, *twins(search, better, offset)}
 
 
 def test_a_neutral_depth_stands_still_beside_a_free_trim(fitter: Fitter) -> None:

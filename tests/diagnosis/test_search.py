@@ -64,6 +64,31 @@ def test_what_every_vehicle_has_joins_at_once() -> None:
     assert found.bic < wrong.bic
 
 
+def test_of_many_what_had_an_equal_is_exchanged_again_beside_another_member(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fitter, asked = Fitter([hidden_dive(duration=40.0)]), []
+    known = frozenset({"munk_moment", "heave_quadratic_drag", "pitch_quadratic_damping"})
+    drifting, buoyant = (known | {"actuator_lag", name} for name in ("vertical_current", "net_buoyancy"))
+    equal = known | {"pitch_sensor_lag", "vertical_current"}
+
+    def exchanged(search: Search, best: Explanation, settled: Names) -> Explanation:
+        asked.append((best.names, settled))
+        return search.tried[buoyant]
+
+    monkeypatch.setattr("host.diagnosis.search.exchanged", exchanged)
+    monkeypatch.setattr("host.diagnosis.search.pruned", lambda _, best: best)
+    monkeypatch.setattr(Search, "across", lambda _, explanations: explanations)
+    with Workers(fitter, 1) as workers:
+        for bic_of_equal, again in ((101.0, [(buoyant, buoyant - {"actuator_lag"})]), (150.0, [])):
+            search = Search(fitter, workers, lambda _: None, fitter.base, fitter.base)
+            for names, bic in ((drifting, 100.0), (equal, bic_of_equal), (buoyant, 95.0)):
+                search.tried[names] = Explanation(names, fitter.base.fit, bic)
+            asked.clear()
+            assert search._settled(search.tried[drifting]).names == buoyant
+            assert asked == [(drifting, frozenset()), *again]
+
+
 def test_two_members_are_missed_only_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Search, "shrink", lambda *_: None)  # all sets are known, and to the end
     monkeypatch.setattr(Search, "polish", lambda *_: None)
