@@ -4,13 +4,14 @@ from math import log
 
 import numpy as np
 
-from host.catalogue import named
+from host.catalogue import UNKNOWN, named
 from host.diagnosis.explanation import Names
 from host.fit import Fit
 from host.recording import Recording
 from host.valleys import log_prior
 
 RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exact twins
+FOREIGN = 8.0  # of BIC, against each form of unknown physics: odds of 50 to 1 for an entry as likely
 LONELY = 8.0  # of BIC, against what seldom acts without another effect that is not there: odds of 50 to 1
 LEAST_COUPLING, MOST_COUPLING, COUPLING_SPREAD = 0.0, 0.8, 0.2  # of the forward speed
 
@@ -19,13 +20,14 @@ def charged_bic(fit: Fit, names: Names, coefficients: int, longest: Recording) -
     """Bayesian information criterion of a fit with so many free coefficients of effects; lower is better.
 
     Charged as well: a speed, a damping or a coupling that is hardly likely, what not every vehicle has, or
-    not by itself, and the choice among all the periods that an oscillation could have had. Not charged: what
-    beside an effect's other coefficients makes no difference on this recording.
+    not by itself, or what the catalogue does not hold, and the choice among all the periods that an
+    oscillation could have had. Not charged: what beside an effect's other coefficients makes no difference on
+    this recording.
 
     longest  of the recordings, which tells most periods apart
     """
     rare = sum(not named(name).is_common for name in names)
-    unlikely = -2.0 * log_prior(fit) + _strange_coupling(fit)
+    unlikely = -2.0 * log_prior(fit) + _strange_coupling(fit) + FOREIGN * len(names & UNKNOWN.keys())
     chosen = sum(2.0 * log(_periods_within(named(name).periods, longest)) for name in names)
     lonely = sum(not {named(name).beside} <= names | {None} for name in names)
     told = coefficients - _untold(fit, names)

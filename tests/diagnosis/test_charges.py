@@ -7,6 +7,7 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.catalogue import named
+from host.diagnosis.charges import FOREIGN, RARITY
 from host.diagnosis.deviations import deviations, interval
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
@@ -45,3 +46,10 @@ def test_an_interval_ends_at_the_bounds_of_its_coefficient() -> None:
         (0.0336, 1.0), abs=1e-3
     )
     assert interval(named("trim_moment"), "c_q0", 0.0, 1.0) == pytest.approx((-1.96, 1.96))
+
+
+def test_a_form_of_unknown_physics_is_charged_beyond_its_coefficients(fitter: Fitter) -> None:
+    entry, form = (frozenset({name}) for name in ("heave_quadratic_drag", "unknown_moment_w_w"))
+    fit = fitter.grown(fitter.base, "heave_quadratic_drag", []).fit
+    assert fitter.free_parameters(entry) == fitter.free_parameters(form)
+    assert fitter.bic(fit, form) - fitter.bic(fit, entry) == pytest.approx(FOREIGN + RARITY)
