@@ -7,7 +7,8 @@ coefficients p is therefore taken as
 
     a -> a exp(d_a / a),    c -> (c + d_c) exp(d_a / a)    for every coefficient c of the equation of a,
 
-which is d itself plus c d_a / a to first order.
+which is d itself plus c d_a / a to first order. Where a hardly damps there is no such valley, and the step is
+d itself: a damping that is too small by far would otherwise never grow, as all else would grow with it.
 """
 
 from collections.abc import Sequence
@@ -18,6 +19,7 @@ import numpy as np
 from host.recording import Array
 
 LARGEST = 2.0  # of a logarithm, in one step
+IDLE = -0.1  # 1/s, of a damping: what brakes the vehicle is something else
 EQUATIONS = {
     "a1": ("b1", "heave_offset", "trim_heave"),
     "a2": ("a3", "b2", "pitch_offset", "trim_pitch"),
@@ -28,7 +30,7 @@ PREFIXES = {"a1": "c_w", "a2": "c_q"}  # of the coefficients that the catalogue 
 def slopes(names: tuple[str, ...], parameters: Array) -> Array:
     """Derivatives (n, n) of the parameters by a step, where it begins."""
     table = np.eye(len(names))
-    for damping, own in _equations(names):
+    for damping, own in _straight(names, parameters):
         table[own, damping] = parameters[own] / parameters[damping]
     return table
 
@@ -36,11 +38,15 @@ def slopes(names: tuple[str, ...], parameters: Array) -> Array:
 def stepped(names: tuple[str, ...], parameters: Array, step: Array) -> Array:
     """The parameters (n,) one step on."""
     after = parameters + step
-    for damping, own in _equations(names):
+    for damping, own in _straight(names, parameters):
         growth = np.exp(np.clip(step[damping] / parameters[damping], -LARGEST, LARGEST))
         after[damping] = parameters[damping] * growth
         after[own] *= growth
     return after
+
+
+def _straight(names: tuple[str, ...], parameters: Array) -> list[tuple[int, Sequence[int]]]:
+    return [(damping, own) for damping, own in _equations(names) if parameters[damping] < IDLE]
 
 
 @cache

@@ -22,7 +22,7 @@ from host.diagnosis.prospects import gain, probed
 from host.diagnosis.starts import with_other_moments
 from host.filter_error import filter_error_from
 from host.gauss_newton import Point
-from host.valleys import USUAL_SPEED
+from host.valleys import USUAL_SPEED, with_poles_swapped
 
 if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
@@ -49,8 +49,11 @@ def continued(search: "Search", names: Names, most_beside: int) -> Explanation |
     """
     fitter, common = search.fitter, names | {ALONG_THE_HULL}
     followed = _with_what_is_large(search, names)
+    swapped = [at for one in followed for at in with_poles_swapped(_at(one))]
     for share in STAGES[UNDECIDED:]:
-        followed = _moved(search, _distinct(_under(search, followed, share, STEPS)))
+        others = _steered(search, [_forced(fitter, at, share) for at in swapped], STEPS)
+        followed = _distinct([*_under(search, followed, share, STEPS), *others])[:FOLLOWED]
+        followed, swapped = _moved(search, followed), []
         while followed and _lacks(followed[0], LITTLE) and len(followed[0].names - common) < most_beside:
             larger = _best_of_each(_larger(search, followed[0], PROMISING))[:1]
             if not larger or larger[0].bic > followed[0].bic - NAMING_MARGIN:

@@ -1,18 +1,22 @@
 """Many effects found at once where the free run tells nothing: the measurements steer the state at first."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from host import straightened
 from host.catalogue import ORDINARY
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis import continuation as module
-from host.diagnosis.continuation import continued
+from host.diagnosis.continuation import STAGES, continued
+from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.search import Search
 from host.diagnosis.workers import Workers
+from host.gauss_newton import Point
 from host.recording import Recording
 
 NAMES = frozenset({*ORDINARY, FREE_TRIM.name})
@@ -42,8 +46,13 @@ def along_the_hull(w: float, q: float) -> tuple[float, float]:
     return float(np.mean(local)), float(-4.0 / HALF_LENGTH**3 * np.mean(y * local))
 
 
-def dive(hull: Hull, drag: Drag = two_drags, rows: int = 900, is_weakened: bool = False) -> Recording:
-    """Integrated by scipy; speed measured, constant. From 70 s on the plane has lost two fifths, if so."""
+def dive(
+    hull: Hull, drag: Drag = two_drags, rows: int = 900, is_weakened: bool = False, servo: float = 1e-3
+) -> Recording:
+    """Integrated by scipy; speed measured, constant. From 70 s on the plane has lost two fifths, if so.
+
+    servo  s, its time constant
+    """
     rng = np.random.default_rng(3)
     h = 0.1
     rudder, at = np.zeros(rows), 30
@@ -51,13 +60,14 @@ def dive(hull: Hull, drag: Drag = two_drags, rows: int = 900, is_weakened: bool 
         until = at + int(rng.uniform(15, 50))
         rudder[at:until] = rng.uniform(-0.12, 0.12)
         at = until
-    x, states = np.array([0.0, 0.0, 0.0, 20.0]), np.empty((4, rows))
+    x, states = np.array([0.0, 0.0, 0.0, 20.0, 0.0]), np.empty((5, rows))
     for k in range(rows):
         states[:, k] = x
         share = 1.0 - WEAKENED_BY * (is_weakened and k * h >= WEAKENED_AT)
 
-        def rate(_: float, x: np.ndarray, plane: float = share * rudder[k]) -> list[float]:  # type: ignore[type-arg]
-            w, q, theta, _ = x
+        def rate(_: float, x: np.ndarray, command: float = rudder[k], share: float = share) -> list[float]:  # type: ignore[type-arg]
+            w, q, theta, _, angle = x
+            plane = share * angle
             heaving, turning = drag(w, q)
             return [
                 hull["a1"] * w + hull["c_ww"] * heaving + hull["c_wq"] * q + hull["b1"] * plane,
@@ -68,6 +78,7 @@ def dive(hull: Hull, drag: Drag = two_drags, rows: int = 900, is_weakened: bool 
                 + hull["b2"] * plane,
                 q,
                 w * np.cos(theta) - 1.5 * np.sin(theta),
+                (command - angle) / servo,
             ]
 
         x = solve_ivp(rate, (0.0, h), x, rtol=1e-8, atol=1e-10).y[:, -1]
@@ -122,6 +133,48 @@ def test_a_long_hull_that_meets_the_water_differently_at_either_end(rows: int) -
     values = dict(zip(found.fit.structure.names, found.fit.parameters, strict=True))
     assert fitter.excess(found.fit) < 1.15
     assert values["drag_half_length"] == pytest.approx(HALF_LENGTH, rel=0.15)
+
+
+def begun_with(fitter: Fitter, values: Hull, share: float) -> Point:
+    at = module._begun(fitter, NAMES, fitter.speed)
+    own = zip(at.structure.names, at.parameters, strict=True)
+    known = np.array([values.get(name, value) for name, value in own])
+    return module._forced(fitter, replace(at, parameters=known), share)
+
+
+def test_a_hull_that_was_taken_for_a_slow_servo_is_asked_about_the_other_way_round(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fitter = Fitter([dive(LONG, servo=0.1)])
+    grown = -4.3 / LONG["a3"]  # of LONG, a pole of pitch at -0.43 and one in the place of the servo's
+    wrong = LONG | {name: LONG[name] * grown for name in ("a3", "b2", "c_qw", "c_qq")}
+    wrong |= {"a2": -10.4, "lag_time": 0.85}
+    asked: list[Point] = []
+
+    def stuck(search: Search, names: Names) -> list[Explanation]:  # noqa: ARG001
+        return [module._climbed(fitter, begun_with(fitter, wrong, STAGES[0]), 0)]
+
+    def steered(_: Search, points: list[Point], steps: int = 0) -> list[Explanation]:  # noqa: ARG001
+        asked.extend(points)
+        return []
+
+    monkeypatch.setattr(module, "_with_what_is_large", stuck)
+    monkeypatch.setattr(module, "_steered", steered)
+    with Workers(fitter, 1) as workers:
+        assert continued(search_of(workers, fitter), NAMES, most_beside=0) is None
+    known = [dict(zip(point.structure.names, point.parameters, strict=True)) for point in asked]
+    (right,) = [one for one in known if one["lag_time"] == pytest.approx(0.1, abs=0.01)]
+    assert {name: right[name] for name in LONG} == pytest.approx(LONG, rel=0.02)
+
+
+def test_a_damping_that_began_at_next_to_nothing_grows(monkeypatch: pytest.MonkeyPatch) -> None:
+    fitter = Fitter([dive(SHORT)])
+    idle = {"a2": -0.008, "a3": -0.52, "b2": -1.1, "c_qw": 2.9, "c_qq": -18.9}
+    start = begun_with(fitter, SHORT | idle, STAGES[0])
+    a2 = start.structure.names.index("a2")
+    assert module._climbed(fitter, start, 10).fit.parameters[a2] == pytest.approx(SHORT["a2"], rel=0.6)
+    monkeypatch.setattr(straightened, "IDLE", 0.0)
+    assert module._climbed(fitter, start, 10).fit.parameters[a2] > -0.1
 
 
 def test_a_recording_that_the_filter_loses_has_no_continuation(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -94,7 +94,7 @@ def test_a_fit_that_ended_in_another_rest_of_the_plane_begins_again_at_the_right
     fitter, names = Fitter([hidden_dive(lamed)]), frozenset({"rudder_effectiveness_change"})
     stuck, right = (
         fitter.explained(names, fitter.carried_on(fitter.point(names, fitter.base, *names, np.array(values))))
-        for values in ([-0.5, WEAKENED_AT + 4.5], [-0.5, WEAKENED_AT])
+        for values in ([-0.5, WEAKENED_AT + 4.0], [-0.5, WEAKENED_AT])
     )
     assert stuck.fit.parameters[-1] > WEAKENED_AT + 3.0
     (again,) = with_other_moments(fitter, stuck)
