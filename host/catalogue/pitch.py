@@ -2,6 +2,7 @@
 
 import casadi as ca
 
+from host.catalogue import weight
 from host.catalogue.gravity import GRAVITY
 from host.equations import Chain, Effect, Parameter
 
@@ -36,6 +37,12 @@ def _drag_along_the_hull(c: Chain) -> None:
         mostly_turns = turning * (1 + 2 * share**2 - share**4 / 3)
         damped = ca.if_else(heaving > turning, 8 / 3 * heaving, mostly_turns)
         c.pitch += c.p["c_qq"] * c.q * (damped - turning) / half
+
+
+def _ballast_off_centre(c: Chain) -> None:
+    if "c_wb" in c.p:
+        arm = c.p["ballast_forward"] * ca.cos(c.theta) + c.p["ballast_below"] * ca.sin(c.theta)
+        c.pitch -= weight.ballast(c) * arm
 
 
 def _pendulum(c: Chain) -> None:
@@ -83,6 +90,25 @@ EFFECTS = (
         probes=((0.0,),),
         force=_trim,
         is_common=True,
+    ),
+    Effect(
+        name="ballast_off_centre",
+        slot="pitch",
+        parameters=(
+            Parameter(
+                name="ballast_forward", unit="1/m", lower=-20, upper=20, meaning="moment per force, forward"
+            ),
+            Parameter(
+                name="ballast_below", unit="1/m", lower=-20, upper=20, meaning="moment per force, below"
+            ),
+        ),
+        sentence="What came or went was not at the centre of buoyancy: it turns the hull as well.",
+        equation="q' = ... - c_wb (ballast_forward cos theta + ballast_below sin theta) (t > ballast_time)",
+        manoeuvre="climbs and dives, and straight level runs, before and after",
+        probes=((0.0, 0.0),),
+        sizes=("ballast_forward", "ballast_below"),
+        force=_ballast_off_centre,
+        changes=("ballast_change",),
     ),
     Effect(
         name="munk_moment",

@@ -40,9 +40,10 @@ def verdict_on(
 
 
 def rare_in(explanation: Explanation) -> list[str]:
-    """The effects of a set that not every vehicle has, and that are no offset."""
+    """The effects of a set that not every vehicle has, and that are no offset or detail of another effect."""
     usual = {*ORDINARY, *OFFSETS}
-    return [name for name in known_in(explanation) if name not in usual and not BY_NAME[name].is_common]
+    rare = [BY_NAME[name] for name in known_in(explanation) if name not in usual]
+    return [effect.name for effect in rare if not effect.is_common and not effect.changes]
 
 
 def cancelling_in(explanation: Explanation) -> list[str]:

@@ -195,6 +195,21 @@ def test_drag_along_the_hull_is_the_integral_over_its_length(w: float, q: float)
     assert moment == pytest.approx(damping * -2.0 / half**4 * trapezoid(y * local, y), abs=1e-6)
 
 
+@pytest.mark.parametrize(("time", "share"), [(10.0, 0.0), (30.0, 1.0)])
+def test_a_weight_that_came_off_the_centre_turns_the_hull(time: float, share: float) -> None:
+    weight, forward, below, theta = 0.06, 0.3, 0.2, 0.5
+    structure = structure_of(("ballast_change", "ballast_off_centre"))
+    own = {"c_wb": weight, "ballast_time": 20.0, "ballast_forward": forward, "ballast_below": below}
+    values = dict.fromkeys(structure.names, 0.0) | own
+    drive = [0.0, 0.0, 0.0, 0.1, time, 0.0]
+    state, parameters = [0.0, 0.0, theta, 0.0], [values[n] for n in structure.names]
+    chain = structure.chain(*map(ca.DM, (state, parameters, drive, time)))
+    force, moment = np.array(ca.evalf(structure.derivative(chain))).ravel()[:2]
+    # Down the hull's own axes: a weight ahead of the centre and below it turns the bow down as it pitches up.
+    assert force == pytest.approx(share * weight * np.cos(theta))
+    assert moment == pytest.approx(-share * weight * (forward * np.cos(theta) + below * np.sin(theta)))
+
+
 def test_a_low_centre_of_gravity_pulls_at_the_hull_as_it_swings() -> None:
     # m (w' - u q - zG q^2) = Z and m (u' + w q + zG q') = X, beside the moment of the weight.
     recording = hidden_dive(duration=20.0)
