@@ -39,6 +39,7 @@ PROMISING, MOST_PROMISING = 2, 3  # effects that are tried where one may join, a
 PLACES = 2  # in which each of them begins
 SLIGHTLY = 1.05  # times the variance expected: enough for another look at the moments
 FEW_STEPS, STEPS = 10, 40  # of the parameters at one stage: many lie along a ridge, where a stage is slow
+APPARENT = ("pitch_bias", "vertical_current")  # no constant force does the same where heave is not linear
 LIKELY = {"restoring_share": 1.0, "kinematics_share": 1.0, "pendulum_share": 1.0}  # sin, cos; a pendulum
 
 
@@ -134,7 +135,7 @@ def _distinct(found: list[Explanation]) -> list[Explanation]:
 def _larger(search: "Search", parent: Explanation, most: int) -> list[Explanation]:
     """The set with one effect more, of those that promise most under these forces."""
     # What a free run made of an effect alone is no start here, so each is foretold from its own probes.
-    names = search.candidates(parent)
+    names = [*search.candidates(parent), *(name for name in APPARENT if name not in parent.names)]
     ahead = search.workers.results([(gain, (parent, name, [], True)) for name in names])
     gains = dict(zip(names, ahead, strict=True))
     names = sorted(gains, key=lambda name: -gains[name])[:most]

@@ -47,11 +47,17 @@ def along_the_hull(w: float, q: float) -> tuple[float, float]:
 
 
 def dive(
-    hull: Hull, drag: Drag = two_drags, rows: int = 900, is_weakened: bool = False, servo: float = 1e-3
+    hull: Hull,
+    drag: Drag = two_drags,
+    rows: int = 900,
+    is_weakened: bool = False,
+    servo: float = 1e-3,
+    current: float = 0.0,
 ) -> Recording:
     """Integrated by scipy; speed measured, constant. From 70 s on the plane has lost two fifths, if so.
 
-    servo  s, its time constant
+    servo    s, its time constant
+    current  m/s, downwards
     """
     rng = np.random.default_rng(3)
     h = 0.1
@@ -77,7 +83,7 @@ def dive(
                 + hull["c_qw"] * w
                 + hull["b2"] * plane,
                 q,
-                w * np.cos(theta) - 1.5 * np.sin(theta),
+                w * np.cos(theta) - 1.5 * np.sin(theta) + current,
                 (command - angle) / servo,
             ]
 
@@ -175,6 +181,15 @@ def test_a_damping_that_began_at_next_to_nothing_grows(monkeypatch: pytest.Monke
     assert module._climbed(fitter, start, 10).fit.parameters[a2] == pytest.approx(SHORT["a2"], rel=0.6)
     monkeypatch.setattr(straightened, "IDLE", 0.0)
     assert module._climbed(fitter, start, 10).fit.parameters[a2] > -0.1
+
+
+def test_a_current_joins_beside_the_free_trim_that_cannot_do_its_work() -> None:
+    fitter = Fitter([dive(LONG, current=0.1)])
+    with Workers(fitter, 1) as workers:
+        found = continued(search_of(workers, fitter), NAMES, most_beside=3)
+    assert found is not None
+    assert found.names & {"vertical_current", "pitch_bias"}
+    assert fitter.excess(fitter.polished(found).fit) < 1.15
 
 
 def test_a_recording_that_the_filter_loses_has_no_continuation(monkeypatch: pytest.MonkeyPatch) -> None:
