@@ -8,7 +8,8 @@ from jinja2 import Environment, FileSystemLoader, select_autoescape
 
 from host.catalogue import BY_NAME
 from host.catalogue.moments import SCANS
-from host.diagnosis.answer import Answer
+from host.diagnosis.answer import Against, Answer
+from host.diagnosis.comparison import Status
 from host.diagnosis.deviations import interval
 from host.diagnosis.diagnose import Diagnosis, NamedEffect
 from host.diagnosis.pictures import (
@@ -86,21 +87,44 @@ def summary(answer: Answer) -> str:
     if not found.effects and not unknown_in(found.extended):
         return "Simulation and recording differ, and none of the physics in the catalogue explains it."
     names = [_dated(effect) for effect in found.effects] or ["a force of which only the form is known"]
-    listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    listed = _listed(names)
     before, after = found.base_misfit, found.extended_misfit
     gain = (
         f"depth error {before.depth_rmse_m:.3f} to {after.depth_rmse_m:.3f} m, pitch error "
         f"{np.degrees(before.pitch_rmse_rad):.2f} to {np.degrees(after.pitch_rmse_rad):.2f} deg"
     )
     where = "on stretches it never saw" if found.is_held_out else "on the recording itself"
+    against = answer.against if answer.against is not None and answer.against.kind == "simulation" else None
     lead = {
-        "explained": f"Left out was: {listed}.",
+        "explained": f"Left out{' of the base equations' * (against is not None)} was: {listed}.",
         "partly_explained": f"Part of it is explained by {listed}.",
         "unexplained": f"The nearest of the catalogue, {listed}, does not explain it."
         if found.effects
         else f"None of the physics in the catalogue explains it, but {listed} comes near.",
     }[found.verdict]
-    return f"{lead} With it, {gain} {where}.{_unchanged(found)}"
+    return f"{_difference(against)}{lead} With it, {gain} {where}.{_unchanged(found)}"
+
+
+def _difference(against: Against | None) -> str:
+    """What a simulation has otherwise than the recording: that was the question."""
+    if against is None:
+        return ""
+    if against.comparison.is_equal:
+        return "The simulation holds what the recording shows. "
+    said: dict[Status, str] = {
+        "missing": "lacks",
+        "superfluous": "has too much",
+        "different": "has otherwise",
+    }
+    found = {verb: against.comparison.named(status) for status, verb in said.items()}
+    listed = [
+        f"{verb} {_listed([title(e.name) for e in effects])}" for verb, effects in found.items() if effects
+    ]
+    return f"The simulation {'; it '.join(listed) or 'has other coefficients'}. "
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _unchanged(found: Diagnosis) -> str:

@@ -14,6 +14,7 @@ from host.diagnosis.comparison import Comparison, EffectDifference, Side, at_spe
 from host.diagnosis.diagnose import Diagnosis
 from host.diagnosis.files import document
 from host.diagnosis.given_simulation import against_simulation, check_same_flight
+from host.diagnosis.report import summary
 from host.errors import RecordingError
 from host.recording import Recording
 from tools.cli import main
@@ -46,6 +47,17 @@ def test_what_the_simulation_lacks_and_has_too_much(answer: Answer) -> None:
     assert superfluous.name == "heave_quadratic_drag"
     assert superfluous.given["c_ww"][0] == pytest.approx(-2.0, abs=0.2)
     assert not any(parameter.is_different for parameter in answer.against.comparison.parameters)
+
+
+def test_the_summary_begins_with_the_difference(answer: Answer) -> None:
+    said = summary(answer)
+    assert said.startswith(
+        "The simulation lacks heave pitch rate coupling; it has too much heave quadratic drag. "
+        "Left out of the base equations was: heave pitch rate coupling"
+    )
+    assert answer.against is not None
+    alike = replace(answer, against=replace(answer.against, comparison=Comparison(effects=[], parameters=[])))
+    assert summary(alike).startswith("The simulation holds what the recording shows. ")
 
 
 def test_the_answer_in_the_file(answer: Answer) -> None:
