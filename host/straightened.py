@@ -19,7 +19,7 @@ import numpy as np
 from host.recording import Array
 
 LARGEST = 2.0  # of a logarithm, in one step
-IDLE = -0.1  # 1/s, of a damping: what brakes the vehicle is something else
+HARDLY_DAMPS = -0.1  # 1/s, of a damping: what brakes the vehicle is something else
 EQUATIONS = {
     "a1": ("b1", "heave_offset", "trim_heave"),
     "a2": ("a3", "b2", "pitch_offset", "trim_pitch"),
@@ -46,16 +46,13 @@ def stepped(names: tuple[str, ...], parameters: Array, step: Array) -> Array:
 
 
 def _straight(names: tuple[str, ...], parameters: Array) -> list[tuple[int, Sequence[int]]]:
-    return [(damping, own) for damping, own in _equations(names) if parameters[damping] < IDLE]
+    """Where the dampings that brake the vehicle are, each with what grows with it."""
+    equations = [(names.index(damping), coefficients_beside(names, damping)) for damping in EQUATIONS]
+    return [(damping, own) for damping, own in equations if parameters[damping] < HARDLY_DAMPS]
 
 
 @cache
-def _equations(names: tuple[str, ...]) -> list[tuple[int, Sequence[int]]]:
-    """Where the damping and the coefficients of heave and of pitch are."""
-    return [
-        (
-            names.index(damping),
-            [k for k, name in enumerate(names) if name in named or name.startswith(PREFIXES[damping])],
-        )
-        for damping, named in EQUATIONS.items()
-    ]
+def coefficients_beside(names: tuple[str, ...], damping: str) -> Sequence[int]:
+    """Where the other coefficients of the equation of a damping, a1 or a2, are."""
+    named, prefix = EQUATIONS[damping], PREFIXES[damping]
+    return [k for k, name in enumerate(names) if name in named or name.startswith(prefix)]

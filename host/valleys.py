@@ -23,6 +23,7 @@ from host.gauss_newton import Point
 from host.output_error import output_error
 from host.propagate import Inputs
 from host.recording import Array
+from host.straightened import coefficients_beside
 from host.whiteness import correlation_factor
 
 STRIDES = (0.12, 0.3, 0.55, 1.8, 3.3, 8.0)  # times a1
@@ -38,7 +39,6 @@ USUAL_DAMPING, DAMPING_FACTOR = -1.0, 5.0  # 1/s, of a1; gliders 0.1, small quic
 INSTANT, IDLE = -10.0, -0.1
 A1, A2, A3, B1, B2, U0 = (NAMES.index(name) for name in ("a1", "a2", "a3", "b1", "b2", "u0"))
 LAGS, DEPTH_LAG, MUNK, COUPLING = ("lag_time", "pitch_lag_time"), "depth_lag_time", "c_qw", "c_wq"
-MOMENTS = ("b2", "pitch_offset", MUNK, "c_qq", "c_q0", "trim_pitch")  # what turns, or brakes, the hull
 SHARING_POLES = (*LAGS, DEPTH_LAG, MUNK)  # parameters of effects that bring a pole of their own
 
 
@@ -117,12 +117,12 @@ def with_poles_swapped(point: Point) -> list[Point]:
     [b2 (s - a1) + c_qw b1] / [(s - a1) (s^2 - a2 s - a3)], and c_qw makes up for another a1. Only depth, or
     the plane's own motion, tells these apart.
     """
-    names, values = list(point.structure.names), point.parameters
+    names, values = point.structure.names, point.parameters
     a1, a2, a3, b1, b2 = values[[A1, A2, A3, B1, B2]]
     poles = np.roots([1.0, -a2, -a3])
     if np.abs(poles.imag).max() > NEARLY_REAL * np.abs(poles.real).max() or poles.real.max() >= 0.0:
         return []
-    swapped, moments = [], np.isin(names, MOMENTS)
+    swapped, moments = [], [k for k in coefficients_beside(names, "a2") if k != A3]
     for pole, stays in (poles.real, poles.real[::-1]):
         for lag in (names.index(name) for name in LAGS if name in names):
             moved = _with_pitch_poles(values, stays, -1.0 / values[lag])

@@ -78,6 +78,14 @@ def title(name: str) -> str:
 
 def summary(answer: Answer) -> str:
     """The answer in a sentence or two."""
+    against = answer.against
+    if against is None or against.kind == "model":
+        return _told(answer, "Left out was")
+    return _difference(against) + _told(answer, "Left out of the base equations was")
+
+
+def _told(answer: Answer, left_out: str) -> str:
+    """What the recording lacks in the base."""
     found = answer.found
     if found.verdict == "no_mismatch":
         lead = f"Nothing is missing: the {base_name(answer)} can reproduce this down to the sensors' noise."
@@ -86,41 +94,35 @@ def summary(answer: Answer) -> str:
         return "The given model lacks no physics, but what it holds is not what the recording shows."
     if not found.effects and not unknown_in(found.extended):
         return "Simulation and recording differ, and none of the physics in the catalogue explains it."
-    names = [_dated(effect) for effect in found.effects] or ["a force of which only the form is known"]
-    listed = _listed(names)
+    listed = _listed(
+        [_dated(effect) for effect in found.effects] or ["a force of which only the form is known"]
+    )
     before, after = found.base_misfit, found.extended_misfit
     gain = (
         f"depth error {before.depth_rmse_m:.3f} to {after.depth_rmse_m:.3f} m, pitch error "
         f"{np.degrees(before.pitch_rmse_rad):.2f} to {np.degrees(after.pitch_rmse_rad):.2f} deg"
     )
     where = "on stretches it never saw" if found.is_held_out else "on the recording itself"
-    against = answer.against if answer.against is not None and answer.against.kind == "simulation" else None
     lead = {
-        "explained": f"Left out{' of the base equations' * (against is not None)} was: {listed}.",
+        "explained": f"{left_out}: {listed}.",
         "partly_explained": f"Part of it is explained by {listed}.",
         "unexplained": f"The nearest of the catalogue, {listed}, does not explain it."
         if found.effects
         else f"None of the physics in the catalogue explains it, but {listed} comes near.",
     }[found.verdict]
-    return f"{_difference(against)}{lead} With it, {gain} {where}.{_unchanged(found)}"
+    return f"{lead} With it, {gain} {where}.{_unchanged(found)}"
 
 
-def _difference(against: Against | None) -> str:
+def _difference(against: Against) -> str:
     """What a simulation has otherwise than the recording: that was the question."""
-    if against is None:
-        return ""
     if against.comparison.is_equal:
-        return "The simulation holds what the recording shows. "
-    said: dict[Status, str] = {
-        "missing": "lacks",
-        "superfluous": "has too much",
-        "different": "has otherwise",
-    }
-    found = {verb: against.comparison.named(status) for status, verb in said.items()}
-    listed = [
+        return "The simulation holds what the recording shows. " if against.is_understood else ""
+    verbs: dict[Status, str] = {"missing": "lacks", "superfluous": "has too much", "different": "differs in"}
+    found = {verb: against.comparison.named(status) for status, verb in verbs.items()}
+    said = [
         f"{verb} {_listed([title(e.name) for e in effects])}" for verb, effects in found.items() if effects
     ]
-    return f"The simulation {'; it '.join(listed) or 'has other coefficients'}. "
+    return f"The simulation {'; it '.join(said) or 'has other coefficients'}. "
 
 
 def _listed(names: list[str]) -> str:

@@ -267,11 +267,12 @@ class Search:
             rival = exchanged(self, best, settled)
             if rival is best:
                 break
+            settled = frozenset()
             if len(rival.names) > SMALL:  # once more only what had an equal before
                 settled = rival.names - {name for name in best.names if twins(self, best, name)}
-                if settled == rival.names:
-                    return rival
             best = rival
+            if best.names == settled:
+                break
         return best
 
     def is_hopeless(self, best: Explanation) -> bool:

@@ -57,7 +57,11 @@ def test_the_summary_begins_with_the_difference(answer: Answer) -> None:
     )
     assert answer.against is not None
     alike = replace(answer, against=replace(answer.against, comparison=Comparison(effects=[], parameters=[])))
-    assert summary(alike).startswith("The simulation holds what the recording shows. ")
+    assert summary(alike).startswith("The simulation holds what the recording shows. Left out of the base")
+    doubtful = replace(alike, against=replace(alike.against, is_understood=False))  # type: ignore[type-var]
+    assert summary(doubtful).startswith("Left out of the base equations was")
+    linear = replace(answer, found=replace(answer.found, verdict="no_mismatch"))
+    assert summary(linear).startswith("The simulation lacks ")
 
 
 def test_the_answer_in_the_file(answer: Answer) -> None:
