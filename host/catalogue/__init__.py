@@ -21,13 +21,13 @@ from host.catalogue import (
 from host.equations import Effect, Structure
 
 CATALOGUE: tuple[Effect, ...] = (
+    *environment.EFFECTS,  # first: the speed through the water may depend on how that moves
     *surge.EFFECTS,
     *heave.EFFECTS,
     *pitch.EFFECTS,
     *kinematics.EFFECTS,
     *actuator.EFFECTS,
     *sensor.EFFECTS,
-    *environment.EFFECTS,
 )
 CHANGES = changes.EFFECTS
 """Entries that are tried only where something is known to have changed."""

@@ -23,6 +23,10 @@ def _surface_waves(c: Chain) -> None:
     c.climb += oscillation(c, "wave") * ca.exp(-number * c.zeta)
 
 
+def _over_ground(c: Chain) -> None:
+    c.speed = c.speed + c.p["ground_share"] * c.climb * ca.sin(c.theta) * c.is_speed_known
+
+
 EFFECTS = (
     Effect(
         name="vertical_current",
@@ -59,5 +63,19 @@ EFFECTS = (
         sizes=("wave_sine", "wave_cosine"),
         periods=WAVE_PERIODS,
         force=_surface_waves,
+    ),
+    Effect(
+        name="speed_over_ground",
+        slot="environment",
+        parameters=(
+            Parameter(name="ground_share", unit="1", lower=0, upper=2, meaning="1 is over the ground"),
+        ),
+        sentence="The speed was measured over the ground: moving water that a pitched hull meets along its "
+        "axis is not in it.",
+        equation="u = measured speed + ground_share (vertical speed of the water) sin theta",
+        manoeuvre="long climbs and dives in moving water",
+        probes=((1.0,),),
+        force=_over_ground,
+        changes=("current_change", "vertical_current", "internal_wave"),
     ),
 )

@@ -67,6 +67,8 @@ class Fitter:
             # Where the speed is measured its loss is data, and there is nothing in it to estimate.
             self.held |= {name: 0.0 for name in ("c_ud", "c_uq", "speed_step")} | {"speed_time": 1.0}
             self.held["speed_change_time"] = 0.0
+        else:
+            self.held["ground_share"] = 0.0
         self.held |= dict.fromkeys(SPANS.values(), max(float(r.time[-1]) for r in recordings))
         self.held[FIRST] = min(float(r.time[0]) for r in recordings)
         self.held[LAST] = max(float(r.time[-1]) for r in recordings)

@@ -210,6 +210,21 @@ def test_a_weight_that_came_off_the_centre_turns_the_hull(time: float, share: fl
     assert moment == pytest.approx(-share * weight * (forward * np.cos(theta) + below * np.sin(theta)))
 
 
+@pytest.mark.parametrize("is_speed_known", [0.0, 1.0])
+def test_a_speed_over_the_ground_lacks_what_the_water_moves_along_the_hull(is_speed_known: float) -> None:
+    current, speed, theta = 0.3, 1.5, 0.5
+    structure = structure_of(("vertical_current", "large_angle_kinematics", "speed_over_ground"))
+    own = {"current": current, "kinematics_share": 1.0, "ground_share": 1.0, "u0": speed}
+    values = dict.fromkeys(structure.names, 0.0) | own
+    # Water that goes down meets a hull pitched nose up from ahead: along its axis (cos, -sin) theta.
+    over_ground = speed - current * np.sin(theta)
+    drive = [0.0, over_ground if is_speed_known else 0.0, is_speed_known, 0.1, 0.0, 0.0]
+    state, parameters = [0.0, 0.0, theta, 0.0], [values[n] for n in structure.names]
+    chain = structure.chain(*map(ca.DM, (state, parameters, drive, 0.0)))
+    climb = float(np.array(ca.evalf(structure.derivative(chain))).ravel()[3])
+    assert climb == pytest.approx(current - speed * np.sin(theta))
+
+
 def test_a_low_centre_of_gravity_pulls_at_the_hull_as_it_swings() -> None:
     # m (w' - u q - zG q^2) = Z and m (u' + w q + zG q') = X, beside the moment of the weight.
     recording = hidden_dive(duration=20.0)

@@ -62,7 +62,7 @@ def test_many_effects_that_few_vehicles_have_are_doubted_by_name(base: Explanati
     assert sorted(rare_in(crowd)) == sorted(RARE)
     assert rare_in(named(base, RARE[0], "ballast_off_centre", "drag_along_the_hull")) == [RARE[0]]
     said = remaining("partly_explained", crowd, leftover(), misfit(1.0))
-    assert said.startswith("Nothing else is left, but ballast change, ")
+    assert said.startswith("Nothing else is left, but internal wave, ballast change, ")
     assert "may imitate physics that the catalogue does not hold" in said
     off = remaining("partly_explained", crowd, leftover(), misfit(4.0))
     assert "what was learnt does not hold on the stretches that were held out" in off
