@@ -2,9 +2,12 @@
 
 -log L = 1/2 sum_k [log det S_k + e_k^T S_k^-1 e_k] with innovations e and their variances S. Each step moves
 the parameters by Gauss-Newton, with exact sensitivities at fixed gain, and the noise levels by the method of
-scoring; every step goes uphill.
+scoring; every step goes uphill. Of a hull that is unstable under next to no forces the gain changes most as
+the parameters do: where steps at fixed gain promise much and gain nothing, the parameters move by the method
+of scoring, too (Maine and Iliff, NASA RP-1138).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -16,6 +19,9 @@ from host.recording import Array
 DIFFERENCE = 1e-3  # of a log noise level, or of one that has a sign, for derivatives
 LONGEST_STRIDE = 2.5  # of the same in one step
 SETTLED = 0.02  # of the log-likelihood: a step that gains less is the last
+FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e6
+FALSE_PROMISE = 10.0  # of the log-likelihood, by a step that gained nothing: its slopes are not the true ones
+STRIDE = 1e-3  # of a deviation, by which a parameter or an initial state is moved for derivatives
 
 
 class Pass(Protocol):
@@ -77,17 +83,14 @@ def ascend(
 
     holds_noise  whether the noise levels stay as they are, which saves most of the work
     """
-    here, damping, converged, used = place(point, model), 1e-3, False, 0
+    here, damping, converged, used = place(point, model), FIRST_DAMPING, False, 0
     while not converged and used < most_steps and np.isfinite(here.likelihood):
         used += 1
         step = GaussNewton(model.whitened(here.point, here.passes), here.point, free)
         scoring = None if holds_noise else _Scoring(here, model)
-        while True:
-            noise = here.point.noise if scoring is None else scoring.trial(damping)
-            there = place(step.trial(damping).with_noise(noise), model)
-            if there.likelihood > here.likelihood or damping > 1e6:
-                break
-            damping = max(damping * 10.0, 1e-3)
+        there, damping = _uphill(here, model, step, scoring, damping)
+        if there.likelihood - here.likelihood <= SETTLED and step.promise() > FALSE_PROMISE:
+            there, damping = _uphill(here, model, _scored(here, model, step), scoring, FIRST_DAMPING)
         gained = there.likelihood - here.likelihood
         converged = not gained > SETTLED
         if gained > 0.0:
@@ -96,11 +99,39 @@ def ascend(
     return here, used, converged
 
 
-class _Scoring(Generic[P]):
-    """Scores and Fisher information of the noise levels, by differences of the innovations.
+def _uphill(
+    here: Place[P], model: NoiseModel[P], step: GaussNewton, scoring: "_Scoring[P] | None", damping: float
+) -> tuple[Place[P], float]:
+    """The first point uphill, ever closer, and the damping that led there."""
+    while True:
+        noise = here.point.noise if scoring is None else scoring.trial(damping)
+        there = place(step.trial(damping).with_noise(noise), model)
+        if there.likelihood > here.likelihood or damping > MOST_DAMPING:
+            return there, damping
+        damping = max(damping * 10.0, FIRST_DAMPING)
 
-    d log L = 1/2 sum_k [e^T S^-1 dS S^-1 e - tr(S^-1 dS) - 2 e^T S^-1 de]
-    F_ij = sum_k [1/2 tr(S^-1 d_i S S^-1 d_j S) + d_i e^T S^-1 d_j e]
+
+def _scored(here: Place[P], model: NoiseModel[P], step: GaussNewton) -> GaussNewton:
+    """The step by scores and Fisher information, the gains moving with the parameters, by differences."""
+    point = here.point
+    bounds = [p for p, is_free in zip(point.structure.parameters, step.free, strict=True) if is_free]
+    strides = STRIDE * step.spread()
+    upper = np.array([p.upper for p in bounds])
+    strides[point.parameters[step.free] + strides > upper] *= -1.0
+    starts = [STRIDE / np.sqrt(np.diag(Hxx)) for _, Hxx, _ in step.own]
+    with np.errstate(all="ignore"):
+        moved = [model.passes(moved_point) for moved_point in step.moved(strides, starts)]
+    normal = []
+    for k, (run, own) in enumerate(zip(here.passes, starts, strict=True)):
+        score, information = _score(run, [passes[k] for passes in moved], np.concatenate([strides, own]))
+        known = np.isfinite(score) & np.isfinite(np.diag(information))
+        information[~known] = information[:, ~known] = score[~known] = 0.0
+        normal.append((information, score))
+    return step.with_normal(normal)
+
+
+class _Scoring(Generic[P]):
+    """Scores and Fisher information of the noise levels, by differences.
 
     A level that loses the recording where it is moved stays as it is.
     """
@@ -123,18 +154,11 @@ class _Scoring(Generic[P]):
         self.information[lost, lost] = 1.0
 
     def _add_up(self, here: Place[P], moved: list[list[P]]) -> None:
+        strides = np.full(self.noise.size, DIFFERENCE)
         for k, run in enumerate(here.passes):
-            de = np.array([(passes[k].error - run.error) / DIFFERENCE for passes in moved])
-            dS = np.array([(passes[k].variance - run.variance) / DIFFERENCE for passes in moved])
-            inverse = _inverse(run)
-            e = _times(inverse, run.error)
-            # S^-1 dS, row by row of the 2 x 2 matrix
-            ratio = np.stack([_times(inverse, dS[:, :2]), _times(inverse, dS[:, 1:])], axis=2)
-            pull = dS[:, 0] * e[0] ** 2 + 2.0 * dS[:, 1] * e[0] * e[1] + dS[:, 2] * e[1] ** 2
-            trace = ratio[:, 0, 0] + ratio[:, 1, 1]
-            self.score += 0.5 * np.sum(pull - trace, axis=1) - np.einsum("ick,ck->i", de, e)
-            self.information += 0.5 * np.einsum("iabk,jbak->ij", ratio, ratio)
-            self.information += np.einsum("ick,jck->ij", de, _times(inverse, de))
+            score, information = _score(run, [passes[k] for passes in moved], strides)
+            self.score += score
+            self.information += information
 
     def trial(self, damping: float) -> Array:
         """The noise levels one damped step on."""
@@ -146,6 +170,27 @@ class _Scoring(Generic[P]):
     def _moved(self, stride: Array) -> Array:
         signed = self.model.signed
         return np.where(signed, self.noise + stride, self.noise * np.exp(np.where(signed, 0.0, stride)))
+
+
+def _score(run: Pass, moved: Sequence[Pass], strides: Array) -> tuple[Array, Array]:
+    """Score (n,) and Fisher information (n, n) of what was moved by n strides, by differences.
+
+    d log L = 1/2 sum_k [e^T S^-1 dS S^-1 e - tr(S^-1 dS) - 2 e^T S^-1 de]
+    F_ij = sum_k [1/2 tr(S^-1 d_i S S^-1 d_j S) + d_i e^T S^-1 d_j e]
+    """
+    with np.errstate(all="ignore"):
+        de = np.array([(one.error - run.error) / h for one, h in zip(moved, strides, strict=True)])
+        dS = np.array([(one.variance - run.variance) / h for one, h in zip(moved, strides, strict=True)])
+        inverse = _inverse(run)
+        e = _times(inverse, run.error)
+        # S^-1 dS, row by row of the 2 x 2 matrix
+        ratio = np.stack([_times(inverse, dS[:, :2]), _times(inverse, dS[:, 1:])], axis=2)
+        pull = dS[:, 0] * e[0] ** 2 + 2.0 * dS[:, 1] * e[0] * e[1] + dS[:, 2] * e[1] ** 2
+        trace = ratio[:, 0, 0] + ratio[:, 1, 1]
+        score = 0.5 * np.sum(pull - trace, axis=1) - np.einsum("ick,ck->i", de, e)
+        information = 0.5 * np.einsum("iabk,jbak->ij", ratio, ratio)
+        information += np.einsum("ick,jck->ij", de, _times(inverse, de))
+    return score, information
 
 
 def _det(run: Pass) -> Array:

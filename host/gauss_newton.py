@@ -1,5 +1,7 @@
 """Damped Gauss-Newton steps on whitened innovations, each recording's initial state eliminated."""
 
+from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,6 +43,13 @@ def whiten(error: Array, sensitivity: Array, variance: Array) -> tuple[Array, Ar
     return white, scores
 
 
+def _normal(error: Array, scores: Array, free: Mask) -> tuple[Array, Array]:
+    """Normal matrix and right-hand side of the free parameters and the initial state."""
+    J = np.concatenate([scores[:, : free.size][:, free], scores[:, free.size :]], axis=1)
+    flat = J.transpose(1, 0, 2).reshape(int(free.sum()) + NX0, -1)
+    return flat @ flat.T, flat @ error.ravel()
+
+
 class GaussNewton:
     """Normal equations of one iteration.
 
@@ -49,17 +58,37 @@ class GaussNewton:
 
     def __init__(self, white: list[tuple[Array, Array]], point: Point, free: Mask) -> None:
         self.point, self.free = point, free
-        count = int(free.sum())
+        self._add_up([_normal(error, scores, free) for error, scores in white])
+
+    def with_normal(self, normal: list[tuple[Array, Array]]) -> "GaussNewton":
+        """The same with other matrices and right-hand sides of the free parameters + 4 for each recording."""
+        other = copy(self)
+        other._add_up(normal)
+        return other
+
+    def _add_up(self, normal: list[tuple[Array, Array]]) -> None:
+        count = int(self.free.sum())
         self.H, self.g = np.zeros((count, count)), np.zeros(count)
         self.own: list[tuple[Array, Array, Array]] = []
-        for error, scores in white:
-            J = np.concatenate([scores[:, : free.size][:, free], scores[:, free.size :]], axis=1)
-            flat = J.transpose(1, 0, 2).reshape(count + NX0, -1)
-            H, g = flat @ flat.T, flat @ error.ravel()
+        for H, g in normal:
             self.H += H[:count, :count]
             self.g += g[:count]
             Hxx = H[count:, count:] + np.diag(INITIAL_STATE_PRIOR**-2.0)
             self.own.append((H[:count, count:], Hxx, g[count:]))
+
+    def spread(self) -> Array:
+        """Deviation of each free parameter if all else were known."""
+        return np.asarray(1.0 / np.sqrt(np.maximum(np.diag(self.H), 1e-300)))
+
+    def moved(self, strides: Array, starts: list[Array]) -> Iterator[Point]:
+        """The points with one free parameter moved, then those with one initial state, of all recordings."""
+        for k, stride in zip(np.flatnonzero(self.free), strides, strict=True):
+            parameters = self.point.parameters.copy()
+            parameters[k] += stride
+            yield replace(self.point, parameters=parameters)
+        for axis in np.eye(NX0):
+            initial = [x0 + axis * start for x0, start in zip(self.point.initial, starts, strict=True)]
+            yield replace(self.point, initial=initial)
 
     def predicted_cost(self, cost: float) -> float:
         """Deviance, of `cost` here, after the full step if the equations were linear."""

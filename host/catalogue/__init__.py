@@ -25,6 +25,7 @@ CATALOGUE: tuple[Effect, ...] = (
     *surge.EFFECTS,
     *heave.EFFECTS,
     *pitch.EFFECTS,
+    *heave.BY_TURNING,  # by all that turns the hull
     *kinematics.EFFECTS,
     *actuator.EFFECTS,
     *sensor.EFFECTS,

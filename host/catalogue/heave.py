@@ -27,7 +27,7 @@ def _ballast(c: Chain) -> None:
 
 
 def _acceleration(c: Chain) -> None:
-    c.heave += c.p["c_wa"] * c.turning
+    c.heave += c.p["c_wa"] * (c.turning + c.pitch)
 
 
 EFFECTS = (
@@ -47,20 +47,6 @@ EFFECTS = (
         scales=("",),
         force=_coupling,
         is_common=True,
-    ),
-    Effect(
-        name="heave_pitch_acceleration_coupling",
-        slot="heave",
-        parameters=(
-            Parameter(name="c_wa", unit="m/rad", lower=-1, upper=1, meaning="pitch acceleration into heave"),
-        ),
-        sentence="Turning the hull throws it sideways: its centre of gravity, or the water it carries along, "
-        "lies ahead or astern of the reference point (m xG + Zq').",
-        equation="w' = ... + c_wa (a2 q + a3 theta + b2 delta)",
-        manoeuvre="quick plane reversals, then climbs and dives held until the pitch has settled",
-        probes=((0.05,), (-0.05,)),
-        force=_acceleration,
-        beside="heave_pitch_rate_coupling",
     ),
     Effect(
         name="heave_quadratic_drag",
@@ -117,3 +103,21 @@ EFFECTS = (
         force=_ballast,
     ),
 )
+
+BY_TURNING = (
+    Effect(
+        name="heave_pitch_acceleration_coupling",
+        slot="heave",
+        parameters=(
+            Parameter(name="c_wa", unit="m/rad", lower=-1, upper=1, meaning="pitch acceleration into heave"),
+        ),
+        sentence="Turning the hull throws it sideways: its centre of gravity, or the water it carries along, "
+        "lies ahead or astern of the reference point (m xG + Zq').",
+        equation="w' = ... + c_wa q'",
+        manoeuvre="quick plane reversals, then climbs and dives held until the pitch has settled",
+        probes=((0.05,), (-0.05,)),
+        force=_acceleration,
+        beside="heave_pitch_rate_coupling",
+    ),
+)
+"""What follows from q', whatever turns the hull."""

@@ -40,6 +40,7 @@ PLACES = 2  # in which each of them begins
 SLIGHTLY = 1.05  # times the variance expected: enough for another look at the moments
 FEW_STEPS, STEPS = 10, 40  # of the parameters at one stage: many lie along a ridge, where a stage is slow
 APPARENT = ("pitch_bias", "vertical_current")  # no constant force does the same where heave is not linear
+LOST = 2.0  # of BIC a sample, to the best stage: the last ones lead nowhere
 LIKELY = {"restoring_share": 1.0, "kinematics_share": 1.0, "pendulum_share": 1.0}  # sin, cos; a pendulum
 
 
@@ -60,10 +61,20 @@ def continued(search: "Search", names: Names, most_beside: int) -> Explanation |
             if not larger or larger[0].bic > followed[0].bic - NAMING_MARGIN:
                 break
             followed = [*_moved(search, larger), *followed][:FOLLOWED]
-    if not followed:
-        return None
+        if not followed:
+            return None
+        likeliest = _kept(search, followed)
+        if followed[0].bic > likeliest.bic + LOST * likeliest.fit.samples:
+            break
     best = min(followed, key=_charged)
     return fitter.explained(best.names, fitter.fitted([_forced(fitter, _at(best), 0.0)]))
+
+
+def _kept(search: "Search", followed: list[Explanation]) -> Explanation:
+    """The likeliest of all stages: of a hull that is unstable, none of the last is."""
+    known = [] if search.steered is None else [search.steered]
+    search.steered = min([*known, *followed], key=lambda one: one.bic)
+    return search.steered
 
 
 def _with_what_is_large(search: "Search", names: Names) -> list[Explanation]:

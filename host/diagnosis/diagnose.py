@@ -16,7 +16,7 @@ from host.diagnosis.fitter import Fitter
 from host.diagnosis.locate import Location, locate
 from host.diagnosis.plane_choice import Way, by_single_effects, is_likelier, ways
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
-from host.diagnosis.sea_fits import WAVES, again_in_waves, with_regular_waves, with_sea
+from host.diagnosis.sea_fits import WAVES, again_in_waves, again_under_forces, with_regular_waves
 from host.diagnosis.search import Search
 from host.diagnosis.seas import Explained, Waves, evidence
 from host.diagnosis.spans import Spans, divide, excerpt
@@ -187,7 +187,7 @@ def _named(search: Search, best: Explanation, spans: Spans, floor: Array, after:
     return [
         NamedEffect(
             name=name,
-            delta_bic=without.bic - best.bic,
+            delta_bic=min(without.bic - best.bic, MOST_WORTH),
             heldout_gain=1.0 - after.chi2 / misfit(without, spans, floor).chi2,
             twins=twins(search, best, name),
         )
@@ -210,8 +210,9 @@ def _refitted(explanation: Explanation, recordings: list[Recording]) -> Explanat
     fitter = Fitter(recordings, known=explanation)
     if explanation.fit.waves.any():
         return again_in_waves(fitter, explanation)
-    again = fitter.across(fitter.refitted(explanation))
-    return with_sea(fitter, again) if explanation.fit.has_process_noise else again
+    if explanation.fit.has_process_noise:
+        return again_under_forces(fitter, explanation)
+    return fitter.across(fitter.refitted(explanation))
 
 
 def _slots(

@@ -11,7 +11,14 @@ from host.diagnosis.margins import LARGEST_SET, LITTLE
 from host.diagnosis.plane_choice import Way
 from host.diagnosis.pruning import leanest
 from host.diagnosis.search import Search
-from host.diagnosis.seas import Explained, among_waves, explains_more, in_a_sea, in_plain_waves
+from host.diagnosis.seas import (
+    Explained,
+    among_waves,
+    explains_more,
+    in_a_sea,
+    in_plain_waves,
+    led_astray,
+)
 from host.diagnosis.unknown_physics import unknown_in, with_unknown
 from host.diagnosis.workers import Workers
 
@@ -31,6 +38,11 @@ def explain(
     best = search.run(again)
     waves = way.waves if part is None else None
     left, told = leftover(fitter, best), None
+    led = None if left.is_nothing or best.fit.has_process_noise else led_astray(search, best)
+    if led is not None:
+        left_then = leftover(fitter, led[1])
+        if search.follows_no_free_run or left_then.is_nothing:
+            return Explained(led[1], led[0], left_then, None)
     if best.names or not left.is_nothing:
         best = with_unknown(search, best)
         left = leftover(fitter, best)

@@ -185,6 +185,14 @@ class Fitter:
         Until those are found coefficients would run away: a moment would go beyond the recordings, where it
         makes no difference any more, and never come back.
         """
+        start = self.carried_over(explanation)
+        held = np.zeros(start.parameters.size, dtype=bool)
+        inputs = self.inputs(explanation.names)
+        fit = output_error(start, inputs, held, FIRST_ITERATIONS, TOLERANCE)
+        return scanned(self, Point(fit.structure, fit.parameters, fit.initial, fit.noise))
+
+    def carried_over(self, explanation: Explanation) -> Point:
+        """The coefficients of a fit to other stretches, with states such as these begin with."""
         structure, values = structure_of(explanation.names), explanation.fit.parameters.copy()
         for name, value in self.held.items():
             if name in structure.names:
@@ -193,10 +201,7 @@ class Fitter:
             np.array([0.0, 0.0, _first(recording.pitch), _first(recording.depth)])
             for recording in self.recordings
         ]
-        start = Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0]))
-        held = np.zeros(values.size, dtype=bool)
-        fit = output_error(start, self.inputs(explanation.names), held, FIRST_ITERATIONS, TOLERANCE)
-        return scanned(self, Point(fit.structure, fit.parameters, fit.initial, fit.noise))
+        return Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0]))
 
     def free(self, names: Names) -> Mask:
         """Which parameters of a set are estimated."""

@@ -11,6 +11,7 @@ from host.catalogue.unknown import ANY_SMOOTH_FORCE
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.prospects import gain
+from host.diagnosis.speed_forces import are_by_speed
 from host.equations import NAMES
 from host.fit import Fit
 from host.noise_floor import is_quantised
@@ -19,7 +20,7 @@ from host.whiteness import correlation_factor, is_even, is_white
 
 SIGNIFICANCE = 1e-4
 SEA_DOUBT = 1.5  # no sea is as white and steady as the filter takes it to be
-WAVE_COLOUR = 0.05  # autocorrelation that the shape of a spectrum leaves: no sea has one peak of second order
+COLOUR = 0.05  # autocorrelation that the shape of a spectrum leaves: no sea has one peak of second order
 GROUPS, LEAST_IN_GROUP = 10, 5
 LEAST_SEA = 0.003  # m/s; below it physics left out, not moving water, is what passes for noise
 MOVEMENT_SPAN = 0.5  # s
@@ -34,7 +35,8 @@ class Leftover:
 
     is_coloured     the innovations are not white, fast or slow
     is_local        they are larger in one range of the motion than in another, as those of no sea are
-    is_no_sea       the fit needs random forces, but they move the vehicle less than any sea would
+    is_by_speed     the random forces of the fit are what errors of the measured speed do: no sign of anything
+    is_no_sea       the fit needs random forces, and neither a sea nor those errors are such
     is_above_floor  the sensor noise of the fit exceeds what the sensors themselves show
     smooth_gain     twice the log-likelihood that any smooth force of the motion would gain, correlation
                     discounted
@@ -43,6 +45,7 @@ class Leftover:
 
     is_coloured: bool
     is_local: bool
+    is_by_speed: bool
     is_no_sea: bool
     is_above_floor: bool
     smooth_gain: float
@@ -68,11 +71,15 @@ def leftover(fitter: Fitter, best: Explanation) -> Leftover:
     ahead = gain(fitter, best, ANY_SMOOTH_FORCE.name, [], is_thorough=True)
     smooth_gain = ahead / correlation_factor(fit.whitened)
     by_chance = chi2.isf(SIGNIFICANCE, len(ANY_SMOOTH_FORCE.parameters))
-    slack, doubt = WAVE_COLOUR if fit.waves.any() else 0.0, SEA_DOUBT if fit.has_process_noise else 1.0
+    is_by_speed = are_by_speed(fitter, fit)
+    slack = COLOUR if fit.waves.any() or is_by_speed else 0.0
+    doubt = SEA_DOUBT if fit.has_process_noise else 1.0
+    is_sea = fit.waves.any() or _heave_by_sea(fit) >= LEAST_SEA
     return Leftover(
         is_coloured=not all(is_white(e, 20, SIGNIFICANCE, slack) and is_even(e) for e in innovations),
         is_local=_is_local(fitter.recordings, even),
-        is_no_sea=fit.has_process_noise and not fit.waves.any() and _heave_by_sea(fit) < LEAST_SEA,
+        is_by_speed=is_by_speed,
+        is_no_sea=bool(fit.has_process_noise and not is_sea and not is_by_speed),
         is_above_floor=is_above_floor(fitter, fit),
         smooth_gain=smooth_gain,
         is_smooth=bool(smooth_gain > by_chance * doubt),

@@ -7,7 +7,7 @@ import numpy as np
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.spans import Spans
 from host.predict import SETTLING_SPAN, estimate_initial_state
-from host.propagate import free_run, inputs_of
+from host.propagate import Run, free_run, inputs_of
 from host.recording import Array, Recording
 
 
@@ -34,15 +34,18 @@ class Misfit:
         return 0.5 * (self.chi2_depth + self.chi2_pitch)
 
 
-def free_run_errors(explanation: Explanation, recording: Recording) -> Array:
-    """Measured minus free run, pitch and depth (2, N); NaN where not measured and in the first 5 s."""
+def free_run_errors(explanation: Explanation, recording: Recording, lost: float = np.nan) -> Array:
+    """Measured minus free run, pitch and depth (2, N); NaN where not measured and in the first 5 s.
+
+    lost  what a run gives where it leaves the numbers
+    """
     fit = explanation.fit
     inputs = inputs_of(recording, fit.structure)
     opening = recording.between(recording.time[0], recording.time[0] + SETTLING_SPAN)
     initial = estimate_initial_state(fit.parameters, opening, inputs)
     with np.errstate(over="ignore", invalid="ignore"):
         run = free_run(fit.parameters, initial, inputs)
-    errors = np.vstack([recording.pitch, recording.depth]) - run.outputs
+    errors = np.vstack([recording.pitch, recording.depth]) - _known(run, lost)
     errors[:, recording.time < recording.time[0] + SETTLING_SPAN] = np.nan
     return errors
 
@@ -57,7 +60,7 @@ def misfit(explanation: Explanation, spans: Spans, floor: Array) -> Misfit:
     if spans.unseen and not explanation.fit.has_process_noise:
         errors = _errors_passing(explanation, spans)
     else:
-        errors = [free_run_errors(explanation, piece) for piece in spans.judging or spans.teaching]
+        errors = [free_run_errors(explanation, piece, np.inf) for piece in spans.judging or spans.teaching]
     with np.errstate(over="ignore", invalid="ignore"):
         pitch, depth = np.nan_to_num(np.nanmean(np.hstack(errors) ** 2, axis=1), nan=1e12, posinf=1e12)
     return Misfit(
@@ -75,6 +78,9 @@ def _errors_passing(explanation: Explanation, spans: Spans) -> list[Array]:
         with np.errstate(over="ignore", invalid="ignore"):
             passed = free_run(fit.parameters, initial, inputs_of(run, fit.structure))
         # A run that leaves the numbers is as far off as can be, not only as far as it can be followed.
-        outputs = np.where(np.isfinite(passed.outputs), passed.outputs, np.inf)
-        errors.append(np.vstack([unseen.pitch, unseen.depth]) - outputs)
+        errors.append(np.vstack([unseen.pitch, unseen.depth]) - _known(passed, np.inf))
     return errors
+
+
+def _known(run: Run, lost: float) -> Array:
+    return np.where(np.isfinite(run.outputs), run.outputs, lost)

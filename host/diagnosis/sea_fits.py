@@ -64,6 +64,15 @@ def again_in_waves(fitter: Fitter, explanation: Explanation) -> Explanation:
     return fitter.explained(explanation.names, fitter.carried_on(start))
 
 
+def again_under_forces(fitter: Fitter, explanation: Explanation) -> Explanation:
+    """A set that was fitted under random forces to other stretches, fitted to these under such forces.
+
+    No free run is asked first: it may soon have nothing to do with the recording, and lead elsewhere.
+    """
+    start = fitter.carried_over(explanation).with_noise(explanation.fit.noise)
+    return fitter.explained(explanation.names, fitter.carried_on(start))
+
+
 def with_regular_waves(fitter: Fitter, explanation: Explanation) -> Explanation:
     """A set found among waves with the regular wave nearest to them, and white forces, to be simulated.
 

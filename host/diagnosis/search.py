@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from math import inf
 
+import numpy as np
+
 from host.catalogue import named
 from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE, has_memory
@@ -36,6 +38,8 @@ NARROW = 2  # of larger sets, which cost most and of which there are most
 PROMISING = 6
 CONTENDERS = 3  # for the place of the leading set
 MOST_ROUNDS = 4
+LOST = 10.0  # times the noise floor: forces as slight as this leave no stable hull so far away
+SLIGHT = 2e-3  # of the variance of all force: 4 % of it, about as much as any model is off
 
 Progress = Callable[[str], None]
 
@@ -50,6 +54,7 @@ class Search:
     alone  each effect alone, where these were fitted before
     rivals  sets that were fitted in an exchange
     joint   sets with all that every vehicle has
+    steered  what a continuation found likeliest while forces still steered the state
     """
 
     fitter: Fitter
@@ -62,6 +67,7 @@ class Search:
     tried: dict[Names, Explanation] = field(default_factory=dict)
     rivals: set[Names] = field(default_factory=set)
     joint: set[Names] = field(default_factory=set)
+    steered: Explanation | None = None
     _shrunk: dict[Names, set[Names]] = field(default_factory=dict)  # those fitted from larger sets: which
     _polished: set[Names] = field(default_factory=set)  # those of them fitted to the end
 
@@ -76,7 +82,8 @@ class Search:
             return self._settled(min(settled, key=lambda e: e.bic))
         foreign: Explanation | None = None
         for size in range(1, LARGEST_SET + 1):
-            if foreign is None and self._needs_many(beam[0], size) and together(self, beam[0]) is not None:
+            is_time = foreign is None and self._needs_many(beam[0], size)
+            if is_time and (together(self, beam[0]) is not None or self.follows_no_free_run):
                 break
             grown = self.singles() if size == 1 else self._grown(beam, size)
             best_before = min(e.bic for e in beam)
@@ -95,6 +102,8 @@ class Search:
                 if foreign is not None and self._is_only_flexible(foreign, beam[0]):
                     break
         self.on_progress("settling")
+        if self.follows_no_free_run:
+            return min((e for e in self.tried.values() if FREE_TRIM.name not in e.names), key=lambda e: e.bic)
         return completed(self, self._settled(with_best_offsets(self)))
 
     def singles(self) -> list[Explanation]:
@@ -274,6 +283,15 @@ class Search:
             if best.names == settled:
                 break
         return best
+
+    @property
+    def follows_no_free_run(self) -> bool:
+        """Whether slight forces let the equations follow a vehicle that they lose without: it is unstable."""
+        if self.steered is None:
+            return False
+        left = min(self.fitter.excess(self.tried[names].fit) for names in self.joint)
+        forces = self.steered.fit.noise[2:] / np.square(self.fitter.accelerations)
+        return bool(left > LOST and (forces < SLIGHT).all())
 
     def is_hopeless(self, best: Explanation) -> bool:
         """Whether much is left although all that every vehicle has was tried at once."""

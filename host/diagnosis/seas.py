@@ -1,6 +1,7 @@
 """Searches under random forces: where the sea moves the vehicle, and where it does so with a wave's swing."""
 
 from dataclasses import dataclass
+from itertools import combinations
 from math import inf
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ from host.catalogue.unknown import SWINGING_MOMENT
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import Leftover, leftover
-from host.diagnosis.margins import LITTLE, NAMING_MARGIN, margin
+from host.diagnosis.margins import LITTLE, NAMING_MARGIN, ROUGH, margin
 from host.diagnosis.sea_fits import (
     WAVES,
     as_filtered,
@@ -23,6 +24,9 @@ from host.diagnosis.sea_fits import (
     with_waves,
 )
 from host.diagnosis.search import Search
+from host.diagnosis.speed_forces import are_by_speed
+from host.diagnosis.trims import retrimmed
+from host.diagnosis.workers import Task
 from host.waves import is_sea, mean_moment
 
 MEAN_MOMENTS = 2.0  # of what it may be: four seas came to 1.0 to 1.3
@@ -63,15 +67,45 @@ def in_a_sea(calm: Search, best: Explanation) -> tuple[Search, Explanation]:
 
     Each is charged for what it adds, so a set that leaves white noise needs no sea, and a sea needs no set.
     """
-    fitter = calm.fitter
     calm.on_progress("random forces")
-    root, also = with_sea(fitter, calm.root), with_sea(fitter, best)
+    return _rough(calm, best, _among_forces(calm, best)) or (calm, best)
+
+
+def led_astray(calm: Search, best: Explanation) -> tuple[Search, Explanation] | None:
+    """The same where the forces are no more than what errors of the measured speed do, or a model is off.
+
+    No effect, and no form of unknown physics, is to stand for these.
+    """
+    likeliest = min(sets := _among_forces(calm, best), key=lambda e: e.bic)
+    if not (calm.follows_no_free_run or are_by_speed(calm.fitter, likeliest.fit)):
+        return None
+    return _rough(calm, best, sets)
+
+
+def _among_forces(calm: Search, best: Explanation) -> list[Explanation]:
+    """What explains most among the random forces that are likeliest beside it.
+
+    That is what does without them, or what a continuation found before it let go of the forces, as no free
+    run tells of a hull that is unstable. Its free trim is explained by as few offsets as will do.
+    """
+    also = with_sea(calm.fitter, best)
+    if calm.steered is None or calm.steered.bic > also.bic + ROUGH:
+        return [also]
+    sea = with_sea(calm.fitter, calm.steered)
+    ways = [frozenset(way) for count in (0, 1, 2) for way in combinations(OFFSETS, count)]
+    tasks: list[Task] = [(retrimmed, (sea, way)) for way in ways]
+    return [also, min(calm.workers.results(tasks), key=lambda e: e.bic)]
+
+
+def _rough(calm: Search, best: Explanation, sets: list[Explanation]) -> tuple[Search, Explanation] | None:
+    """The search with random forces from these sets; None where they explain no more than `best` without."""
+    fitter, root = calm.fitter, with_sea(calm.fitter, calm.root)
     least = as_filtered(fitter, best).bic
-    if min(root.bic, also.bic) > least - NAMING_MARGIN:
-        return calm, best
+    if min(one.bic for one in (root, *sets)) > least - NAMING_MARGIN:
+        return None
     rough = Search(fitter, calm.workers, calm.on_progress, with_sea(fitter, calm.base), root, calm.part)
-    found = rough.run([also])
-    return (rough, found) if found.bic < least else (calm, best)
+    found = rough.run(sets)
+    return (rough, found) if found.bic < least else None
 
 
 def plain_waves(fitter: Fitter) -> Explanation | None:
@@ -118,7 +152,7 @@ def among_waves(
     fitter, swing = rough.fitter, best.names & {SWINGING_MOMENT.name, WAVES}
     if WAVES in best.names and not best.fit.has_process_noise:
         return rough, best, None  # regular ones
-    if not (best.fit.has_process_noise or swing):
+    if not (best.fit.has_process_noise or swing) or are_by_speed(fitter, best.fit):
         return rough, best, None
     rough.on_progress("waves")
     # What swings in the band of waves may be the waves.

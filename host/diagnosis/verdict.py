@@ -20,6 +20,11 @@ Verdict = Literal["no_mismatch", "explained", "partly_explained", "unexplained"]
 WORSE = 2.0  # chi2 of held-out spans from which on an explanation must at least better the base there
 MOST_RARE = 2  # effects at once that not every vehicle has
 FAINT_WAVES = 30.0  # of BIC over all else: what a late hull imitates reaches about half of that
+BY_SEA = " Random forces act as well (waves, current, turbulence); they are part of the noise model."
+BY_SPEED = (
+    " This hull is unstable, at rest or as it turns: the errors of the measured speed lead any free run away "
+    "from the recording, as small random forces would, and as such they are part of the noise model."
+)
 CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
 
 
@@ -34,9 +39,13 @@ def verdict_on(
         return "no_mismatch"
     # Random forces spoil a free run whatever is known: it need not be better for knowing more.
     worst = max(before.chi2 * (SEA_DOUBT if best.fit.has_process_noise else 1.0), WORSE)
-    if left.is_nothing and after.chi2 < worst and not unknown_in(best):
+    # Nor does it tell of a hull that the errors of the measured speed lead away from any.
+    is_held = after.chi2 < worst or left.is_by_speed
+    if left.is_nothing and is_held and not unknown_in(best):
         return "partly_explained" if _doubt(best, waves) else "explained"
-    return "partly_explained" if known_in(best) and after.chi2 < 0.7 * before.chi2 else "unexplained"
+    # Nor where forces too weak for a sea do.
+    is_better = after.chi2 < 0.7 * before.chi2 or left.is_no_sea
+    return "partly_explained" if known_in(best) and is_better else "unexplained"
 
 
 def rare_in(explanation: Explanation) -> list[str]:
@@ -73,10 +82,7 @@ def _doubt(explanation: Explanation, waves: float) -> str:
 
 def remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit, waves: float = inf) -> str:
     """What the explanation leaves, in words."""
-    sea = (
-        " Random forces act as well (waves, current, turbulence); they are part of the noise model."
-        * best.fit.has_process_noise
-    )
+    sea = (BY_SPEED if left.is_by_speed else BY_SEA) * best.fit.has_process_noise
     if verdict == "no_mismatch":
         return "Nothing is missing from the base model on this recording." + sea
     forms = "".join(f" {sentence}" for sentence in unknown_in(best))

@@ -225,6 +225,17 @@ def test_a_speed_over_the_ground_lacks_what_the_water_moves_along_the_hull(is_sp
     assert climb == pytest.approx(current - speed * np.sin(theta))
 
 
+def test_turning_throws_the_hull_sideways_whatever_turns_it() -> None:
+    structure = structure_of(("heave_pitch_acceleration_coupling", "munk_moment", "pitch_quadratic_damping"))
+    own = {"a2": -0.5, "b2": -1.7, "c_qw": 4.0, "c_qq": -20.0, "c_wa": -0.03}
+    values = dict.fromkeys(structure.names, 0.0) | own
+    state, drive = [0.3, 0.2, 0.1, 0.0], [0.2, 0.0, 0.0, 0.1, 0.0, 0.0]
+    chain = structure.chain(*map(ca.DM, (state, [values[n] for n in structure.names], drive, 0.0)))
+    force, moment = np.array(ca.evalf(structure.derivative(chain))).ravel()[:2]
+    assert moment == pytest.approx(-0.5 * 0.2 - 1.7 * 0.2 + 4.0 * 0.3 - 20.0 * 0.2**2)
+    assert force == pytest.approx(-0.03 * moment)
+
+
 def test_a_low_centre_of_gravity_pulls_at_the_hull_as_it_swings() -> None:
     # m (w' - u q - zG q^2) = Z and m (u' + w q + zG q') = X, beside the moment of the weight.
     recording = hidden_dive(duration=20.0)

@@ -33,8 +33,8 @@ def misfit(chi2: float) -> Misfit:
 
 def leftover(*, is_smooth: bool = False) -> Leftover:
     return Leftover(
-        is_coloured=False, is_local=False, is_no_sea=False, is_above_floor=False, smooth_gain=0.0,
-        is_smooth=is_smooth,
+        is_coloured=False, is_local=False, is_by_speed=False, is_no_sea=False, is_above_floor=False,
+        smooth_gain=0.0, is_smooth=is_smooth,
     )  # fmt: skip
 
 

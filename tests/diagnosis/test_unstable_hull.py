@@ -1,0 +1,85 @@
+"""A hull that is unstable follows no free run: what leads it away is told from physics that was left out."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from host.catalogue import structure_of
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.leftover import leftover
+from host.diagnosis.search import LOST, SLIGHT, Search
+from host.diagnosis.seas import led_astray
+from host.diagnosis.workers import Workers
+from host.gauss_newton import Point
+from host.output_error import output_error
+from host.propagate import free_run, inputs_of
+from tests.diagnosis.hidden_dive import hidden_dive
+
+NAMES = frozenset(
+    {"heave_pitch_rate_coupling", "heave_quadratic_drag", "munk_moment", "pitch_quadratic_damping"}
+)
+HULL = {"a1": -0.8, "a2": -0.5, "a3": -0.7, "b1": -0.17, "b2": -1.7, "u0": 1.5}
+HULL |= {"c_wq": 0.6, "c_ww": -2.0, "c_qw": 4.6, "c_qq": -22.0}
+NOISE = np.array([[2e-3], [1e-2]])  # rad, m
+
+
+@cache
+def flown(speed_noise: float) -> tuple[Fitter, Explanation]:
+    """A dive of this hull, whose speed is measured, and the end of a search from the truth."""
+    rng, rows = np.random.default_rng(1), hidden_dive(duration=120.0)  # its plane alone
+    speed = HULL["u0"] + 0.004 * np.cumsum(rng.standard_normal(rows.time.size))
+    rows = replace(rows, speed=speed)
+    structure = structure_of(NAMES | {"speed_loss"})
+    known = dict.fromkeys(structure.names, 0.0) | {"speed_time": 1.0} | HULL
+    values, start = np.array([known[name] for name in structure.names]), np.array([0.0, 0.0, 0.0, 20.0])
+    inputs = inputs_of(rows, structure)
+    inputs.drive[1] = speed  # as it was, not smoothed
+    run = free_run(values, start, inputs)
+    pitch, depth = run.outputs + NOISE * rng.standard_normal(run.outputs.shape)
+    measured = speed + speed_noise * rng.standard_normal(rows.time.size)
+    fitter = Fitter([replace(rows, pitch=pitch, depth=depth, speed=measured)])
+    names = NAMES | {"speed_loss"}
+    at = Point(structure, values, [start], np.array([*fitter.floor, 0.0, 0.0]))
+    fit = output_error(at, fitter.inputs(names), fitter.free(names))
+    return fitter, fitter.explained(names, fit)
+
+
+def test_errors_of_the_speed_are_not_taken_for_physics() -> None:
+    fitter, best = flown(0.03)
+    assert not leftover(fitter, best).is_nothing
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        led = led_astray(search, best)
+    assert led is not None
+    _, found = led
+    left = leftover(fitter, found)
+    assert left.is_nothing
+    assert left.is_by_speed
+    assert found.names == best.names
+    known = dict(zip(found.fit.structure.names, found.fit.parameters.tolist(), strict=True))
+    assert all(known[name] == pytest.approx(value, rel=0.15) for name, value in HULL.items() if name != "a2")
+
+
+def test_a_free_run_that_follows_is_not_led_astray() -> None:
+    fitter, best = flown(0.0)
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        assert led_astray(search, best) is None
+
+
+@pytest.mark.parametrize(
+    ("share", "excess", "is_unstable"), [(0.5, 2.0, True), (2.0, 2.0, False), (0.5, 0.5, False)]
+)
+def test_slight_forces_beside_a_free_run_that_is_lost(share: float, excess: float, is_unstable: bool) -> None:
+    fitter, best = flown(0.0)
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        assert not search.follows_no_free_run
+        forces = share * SLIGHT * np.square(fitter.accelerations)
+        search.steered = replace(best, fit=replace(best.fit, noise=np.array([*fitter.floor, *forces])))
+        lost = np.array([*(excess * LOST * fitter.floor), 0.0, 0.0])
+        search.joint.add(search.remember(replace(best, fit=replace(best.fit, noise=lost))).names)
+        assert search.follows_no_free_run == is_unstable
