@@ -31,7 +31,7 @@ def innovations(
     if gains is None:
         run = free_run(parameters, initial, inputs)
     else:
-        run = _steered(parameters, initial, inputs, gains)
+        run = steered_run(parameters, initial, inputs, gains)
     with np.errstate(over="ignore", invalid="ignore"):
         error = inputs.present * (inputs.measured - run.outputs)
     return error, sensitivities(parameters, initial, inputs, run, gains)
@@ -54,12 +54,12 @@ def sensitivities(
         return seen.transpose(1, 2, 0) * inputs.present[:, None, :]
 
 
-def _steered(parameters: Array, initial: Array, inputs: Inputs, gains: Array) -> Run:
+def steered_run(parameters: Array, initial: Array, inputs: Inputs, gains: Array) -> Run:
     """The run that follows the measurements with given gains."""
     form = form_of(inputs)
     start, _ = start_of(form, parameters, initial, inputs)
     per_step = np.vstack([inputs.drive, inputs.measured, gains])
-    table = over_rows(_steered_run, form, inputs.drive.shape[1])(start, per_step, parameters)
+    table = over_rows(_steered_step, form, inputs.drive.shape[1])(start, per_step, parameters)
     states, outputs, within = np.split(table, [form.nx, form.nx + 2])
     return Run(states=states, outputs=outputs, within=within.reshape((form.substeps, form.nx, -1)))
 
@@ -77,7 +77,7 @@ def _slopes_of_rows(form: Form, run: Run, parameters: Array, drive: Array) -> tu
 
 
 @lru_cache(KEPT)
-def _steered_run(form: Form) -> ca.Function:
+def _steered_step(form: Form) -> ca.Function:
     """One step of the innovations form; gives x, h(x) and where the sub-steps begin."""
     x, p, drive = form.symbols()
     measured, gain = ca.SX.sym("measured", 2), ca.SX.sym("gain", form.nx * 2)

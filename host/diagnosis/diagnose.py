@@ -13,6 +13,7 @@ from host.diagnosis.exchange import twins
 from host.diagnosis.explain import explain
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.leftover import Leftover
 from host.diagnosis.locate import Location, locate
 from host.diagnosis.plane_choice import Way, by_single_effects, is_likelier, ways
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
@@ -30,6 +31,7 @@ from host.noise_floor import noise_floor
 from host.outliers import without_outliers
 from host.recording import Array, Recording
 
+HORIZON = 5.0  # s
 MOST_WORTH = 1e9  # of BIC: without some effects the equations run away
 SLOTS: tuple[Slot, ...] = ("heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment")
 
@@ -62,6 +64,7 @@ class Diagnosis:
     base_misfit: Misfit
     extended_misfit: Misfit
     is_held_out: bool
+    horizon: float | None
     effects: list[NamedEffect]
     slots: dict[Slot, float]
     location: Location
@@ -148,6 +151,7 @@ def _diagnosed(
         base_misfit=judged.before,
         extended_misfit=judged.after,
         is_held_out=bool(spans.judging),
+        horizon=_horizon(left),
         effects=effects,
         slots=judged.slots,
         location=locate(longest, errors, floor, values["u0"]),
@@ -170,9 +174,10 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
     best, search, left, waves = explained
     model = best if waves is None else waves.model
     on_progress("held-out check")
-    before, after = misfit(search.base, spans, floor), misfit(model, spans, floor)
+    horizon = _horizon(left)
+    before, after = (misfit(one, spans, floor, horizon) for one in (search.base, model))
     theirs = frozenset() if waves is None else waves.theirs
-    effects = [one for one in _named(search, best, spans, floor, after) if one.name not in theirs]
+    effects = [one for one in _named(search, best, spans, floor, after, horizon) if one.name not in theirs]
     if waves is not None and WAVES not in best.names:
         effects.append(NamedEffect(name=WAVES, delta_bic=waves.delta_bic))
     effects.sort(key=lambda effect: -effect.delta_bic)
@@ -182,13 +187,20 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
     return Judged(before, after, effects, verdict, _slots(search, best, effects, verdict))
 
 
-def _named(search: Search, best: Explanation, spans: Spans, floor: Array, after: Misfit) -> list[NamedEffect]:
+def _horizon(left: Leftover) -> float | None:
+    """s, how far ahead is foretold where forces too weak for a sea lead any free run away; else None."""
+    return HORIZON if left.is_by_speed or left.is_no_sea else None
+
+
+def _named(
+    search: Search, best: Explanation, spans: Spans, floor: Array, after: Misfit, horizon: float | None
+) -> list[NamedEffect]:
     names = known_in(best)
     return [
         NamedEffect(
             name=name,
             delta_bic=min(without.bic - best.bic, MOST_WORTH),
-            heldout_gain=1.0 - after.chi2 / misfit(without, spans, floor).chi2,
+            heldout_gain=1.0 - after.chi2 / misfit(without, spans, floor, horizon).chi2,
             twins=twins(search, best, name),
         )
         for name, without in zip(names, search.each_without(best, names), strict=True)

@@ -79,6 +79,7 @@ def document(answer: Answer) -> dict[str, Any]:
         "bic": found.bic,
         "ranking": [{"name": name, "delta_bic": gain} for name, gain in found.ranking],
         "is_held_out": found.is_held_out,
+        "horizon_s": found.horizon,
     } | ({against.kind: against.as_json()} if against is not None else {})
 
 

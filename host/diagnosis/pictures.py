@@ -9,7 +9,9 @@ from matplotlib.ticker import NullFormatter
 
 from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import Diagnosis
+from host.diagnosis.explanation import Explanation
 from host.diagnosis.first_guess import smoothed_motion
+from host.diagnosis.foretold import foretold_errors
 from host.diagnosis.scoring import free_run_errors
 from host.diagnosis.separation import Separation
 from host.diagnosis.spans import divide
@@ -32,7 +34,7 @@ def runs_picture(answer: Answer) -> str:
     recording = _longest(found)
     measured = np.vstack([recording.pitch, recording.depth])
     sides = [
-        (name, colour, free_run_errors(explanation, recording))
+        (name, colour, _errors(found, explanation, recording))
         for explanation, colour, name in (
             (found.base, BASE_COLOUR, base_name(answer)),
             (found.extended, MODEL, "extended model"),
@@ -77,6 +79,13 @@ def runs_picture(answer: Answer) -> str:
     axes[4].set_xlabel("time, s")
     figure.align_ylabels()
     return data_uri(figure)
+
+
+def _errors(found: Diagnosis, explanation: Explanation, recording: Recording) -> Array:
+    """Of the free run, or of what is foretold where no free run is followed."""
+    if found.horizon is None:
+        return free_run_errors(explanation, recording)
+    return foretold_errors(explanation, recording, found.horizon)
 
 
 def proof_picture(answer: Answer) -> str:

@@ -50,6 +50,7 @@ def write_report(answer: Answer, vehicle: str, path: Path) -> None:
         summary=summary(answer),
         effects=[_effect(effect, answer) for effect in found.effects],
         held_out=found.is_held_out,
+        horizon=found.horizon,
         proof=_proof(answer),
         remaining=found.remaining,
         region=location.region[:1].upper() + location.region[1:],
@@ -110,7 +111,8 @@ def _told(answer: Answer, left_out: str) -> str:
         if found.effects
         else f"None of the physics in the catalogue explains it, but {listed} comes near.",
     }[found.verdict]
-    return f"{lead} With it, {gain} {where}.{_unchanged(found)}"
+    ahead = "" if found.horizon is None else f", foretold {found.horizon:.0f} s ahead"
+    return f"{lead} With it, {gain} {where}{ahead}.{_unchanged(found)}"
 
 
 def _difference(against: Against) -> str:

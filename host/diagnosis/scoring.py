@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.diagnosis.explanation import Explanation
+from host.diagnosis.foretold import foretold_errors
 from host.diagnosis.spans import Spans
 from host.predict import SETTLING_SPAN, estimate_initial_state
 from host.propagate import Run, free_run, inputs_of
@@ -50,14 +51,18 @@ def free_run_errors(explanation: Explanation, recording: Recording, lost: float 
     return errors
 
 
-def misfit(explanation: Explanation, spans: Spans, floor: Array) -> Misfit:
+def misfit(explanation: Explanation, spans: Spans, floor: Array, horizon: float | None = None) -> Misfit:
     """Scores a fit to the teaching recordings on what it has not seen, against the noise floor (2,).
 
     The free run of the fit passes through the stretches that were held out, so that lags and the speed arrive
     there as they are. Where random forces act it would stray from any truth: there it begins anew with each
     stretch, and so it does where recordings judge as a whole.
+
+    horizon  s over which each stretch is foretold instead
     """
-    if spans.unseen and not explanation.fit.has_process_noise:
+    if horizon is not None:
+        errors = [foretold_errors(explanation, one, horizon) for one in spans.judging or spans.teaching]
+    elif spans.unseen and not explanation.fit.has_process_noise:
         errors = _errors_passing(explanation, spans)
     else:
         errors = [free_run_errors(explanation, piece, np.inf) for piece in spans.judging or spans.teaching]

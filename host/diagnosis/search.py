@@ -287,7 +287,7 @@ class Search:
     @property
     def follows_no_free_run(self) -> bool:
         """Whether slight forces let the equations follow a vehicle that they lose without: it is unstable."""
-        if self.steered is None:
+        if self.steered is None or not self.joint:
             return False
         left = min(self.fitter.excess(self.tried[names].fit) for names in self.joint)
         forces = self.steered.fit.noise[2:] / np.square(self.fitter.accelerations)

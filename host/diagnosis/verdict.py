@@ -39,13 +39,9 @@ def verdict_on(
         return "no_mismatch"
     # Random forces spoil a free run whatever is known: it need not be better for knowing more.
     worst = max(before.chi2 * (SEA_DOUBT if best.fit.has_process_noise else 1.0), WORSE)
-    # Nor does it tell of a hull that the errors of the measured speed lead away from any.
-    is_held = after.chi2 < worst or left.is_by_speed
-    if left.is_nothing and is_held and not unknown_in(best):
+    if left.is_nothing and after.chi2 < worst and not unknown_in(best):
         return "partly_explained" if _doubt(best, waves) else "explained"
-    # Nor where forces too weak for a sea do.
-    is_better = after.chi2 < 0.7 * before.chi2 or left.is_no_sea
-    return "partly_explained" if known_in(best) and is_better else "unexplained"
+    return "partly_explained" if known_in(best) and after.chi2 < 0.7 * before.chi2 else "unexplained"
 
 
 def rare_in(explanation: Explanation) -> list[str]:
@@ -113,7 +109,5 @@ def remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit
         kind = "it is as rough as sensor noise, but larger than these sensors show elsewhere"
     is_part = verdict == "partly_explained"
     begin = "Most is explained, but" if is_part else "None of the physics in the catalogue explains this:"
-    return (
-        f"{begin} {worst} is still off by {size:.1f} times its sensor noise in a free run; {kind}.{forms}"
-        + sea
-    )
+    run = "a few seconds ahead" if left.is_by_speed or left.is_no_sea else "in a free run"
+    return f"{begin} {worst} is still off by {size:.1f} times its sensor noise {run}; {kind}.{forms}" + sea

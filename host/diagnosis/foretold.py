@@ -1,0 +1,35 @@
+"""What a model foretells over a few seconds, for a hull that no free run follows for long."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from host.diagnosis.explanation import Explanation
+from host.kalman import kalman_pass
+from host.predict import SETTLING_SPAN
+from host.propagate import inputs_of
+from host.recording import Array, Recording
+from host.sensitivities import steered_run
+
+
+def foretold_errors(explanation: Explanation, recording: Recording, horizon: float) -> Array:
+    """Measured minus foretold, pitch and depth (2, N); NaN where not measured and in the first 5 s.
+
+    A Kalman filter follows the measurements; every `horizon` s it is let go, and until the next time the
+    planes alone are known.
+    """
+    fit, time = explanation.fit, recording.time
+    inputs = inputs_of(recording, fit.structure)
+    first = [values[np.isfinite(values)][:1].sum() for values in (recording.pitch, recording.depth)]
+    initial = np.array([0.0, 0.0, *first])
+    followed = kalman_pass(fit.parameters, initial, fit.noise, inputs)
+    outputs = np.full((2, time.size), np.nan)
+    number = np.floor((time - time[0] - SETTLING_SPAN) / horizon)
+    for ahead in (number == one for one in np.unique(number[number >= 0.0])):
+        until = np.flatnonzero(ahead)[-1] + 1
+        gains = np.where(ahead, 0.0, followed.gains)[:, :until]
+        cut = {name: getattr(inputs, name)[:, :until] for name in ("drive", "measured", "present")}
+        run = steered_run(fit.parameters, initial, replace(inputs, **cut), gains)
+        outputs[:, ahead] = run.outputs[:, ahead[:until]]
+    outputs[~np.isfinite(outputs) & (number >= 0.0)] = np.inf
+    return np.asarray(np.vstack([recording.pitch, recording.depth]) - outputs)
