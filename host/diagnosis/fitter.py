@@ -124,9 +124,10 @@ class Fitter:
         goal    a fit: a search is given up where it would not get as far
         """
         starts = starts_of(self, parent, name, values, rival)
+        if parent.fit.has_process_noise:  # no free run tells which start is good
+            few = starts[:1] if rival is None else [starts[0], starts[-1]]
+            return self.explained(parent.names | {name}, self.fitted(few))
         fit = self.fitted(starts, goal)
-        if parent.fit.has_process_noise:
-            return self.explained(parent.names | {name}, fit)
         again = starts_again(self, parent, name, values, self.explained(parent.names | {name}, fit))
         others = [self.fitted([start], goal or fit, PATIENT_ITERATIONS) for start in again]
         fit = max([fit, *others], key=plausibility)
@@ -144,7 +145,7 @@ class Fitter:
             moved = replace(start, parameters=np.array([known[own] for own in start.structure.names]))
             start = min(start, moved, key=lambda point: free_run_cost(point, self.inputs(names)))
         starts = [start]
-        if is_far(self, parent):
+        if not parent.fit.has_process_noise and is_far(self, parent):
             starts.append(guess(self, start, names))
         return self.explained(names, self.fitted(starts))
 
@@ -256,7 +257,8 @@ class Fitter:
         names = frozenset(effect.name for effect in structure.effects)
         inputs, free = self.inputs(names), self.free(names)
         if starts[0].noise[2:].any():
-            return self._under_forces(starts[0], holds_noise=True)
+            ends = [self._under_forces(start, holds_noise=True) for start in starts]
+            return max(ends, key=lambda fit: fit.log_likelihood)
         least = -np.inf if rival is None else rival.log_likelihood
         hopeless = least - (0.0 if rival is None else HOPELESS * rival.samples)
         fits = [output_error(start, inputs, free, first, TOLERANCE, hopeless) for start in starts]
