@@ -11,6 +11,13 @@ from host.propagate import inputs_of
 from host.recording import Array, Recording
 from host.sensitivities import steered_run
 
+FIRST_SPREAD = (
+    0.5,
+    0.5,
+    0.2,
+    2.0,
+)  # of w, m/s, q, rad/s, theta, rad, and zeta, m: the filter begins anywhere
+
 
 def foretold_errors(explanation: Explanation, recording: Recording, horizon: float) -> Array:
     """Measured minus foretold, pitch and depth (2, N); NaN where not measured and in the first 5 s.
@@ -22,7 +29,9 @@ def foretold_errors(explanation: Explanation, recording: Recording, horizon: flo
     inputs = inputs_of(recording, fit.structure)
     first = [values[np.isfinite(values)][:1].sum() for values in (recording.pitch, recording.depth)]
     initial = np.array([0.0, 0.0, *first])
-    followed = kalman_pass(fit.parameters, initial, fit.noise, inputs)
+    spread = np.zeros(len(fit.structure.states))
+    spread[: initial.size] = np.square(FIRST_SPREAD)
+    followed = kalman_pass(fit.parameters, initial, fit.noise, inputs, spread)
     outputs = np.full((2, time.size), np.nan)
     number = np.floor((time - time[0] - SETTLING_SPAN) / horizon)
     for ahead in (number == one for one in np.unique(number[number >= 0.0])):
