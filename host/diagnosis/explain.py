@@ -13,6 +13,7 @@ from host.diagnosis.pruning import leanest
 from host.diagnosis.search import Search
 from host.diagnosis.seas import (
     Explained,
+    again_astray,
     among_waves,
     explains_more,
     in_a_sea,
@@ -32,21 +33,23 @@ def explain(
     like: Explanation | None = None,
 ) -> Explained:
     """Searches for the best explanation, or goes on from that of a part, where most has been settled."""
+    if part is not None and part.left.is_by_speed:
+        return again_astray(fitter, workers, on_progress, part)
     known = None if part is None else part.search
     search = Search(fitter, workers, on_progress, fitter.base, fitter.root, known, way.alone)
     again = [fitter.refitted(one) for one in _found_in(part)] if part else _alike(fitter, like)
     best = search.run(again)
     waves = way.waves if part is None else None
     left, told = leftover(fitter, best), None
-    led = None if left.is_nothing or best.fit.has_process_noise else led_astray(search, best)
-    if led is not None:
+    may_be_sea = part is None or part.best.fit.has_process_noise
+    is_astray = may_be_sea and not (left.is_nothing or best.fit.has_process_noise)
+    if is_astray and (led := led_astray(search, best)) is not None:
         left_then = leftover(fitter, led[1])
         if search.follows_no_free_run or left_then.is_nothing:
             return Explained(led[1], led[0], left_then, None)
     if best.names or not left.is_nothing:
         best = with_unknown(search, best)
         left = leftover(fitter, best)
-    may_be_sea = part is None or part.best.fit.has_process_noise
     if may_be_sea and (unknown_in(best) or not left.is_nothing):
         calm, plain = best, None if waves is None else in_plain_waves(search, best, waves)
         if plain is not None and plain.left.is_nothing:

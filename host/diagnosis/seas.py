@@ -1,5 +1,6 @@
 """Searches under random forces: where the sea moves the vehicle, and where it does so with a wave's swing."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
 from math import inf
@@ -17,6 +18,7 @@ from host.diagnosis.leftover import Leftover, leftover
 from host.diagnosis.margins import LITTLE, NAMING_MARGIN, ROUGH, margin
 from host.diagnosis.sea_fits import (
     WAVES,
+    again_under_forces,
     as_filtered,
     roughly_with_waves,
     with_regular_waves,
@@ -26,7 +28,7 @@ from host.diagnosis.sea_fits import (
 from host.diagnosis.search import Search
 from host.diagnosis.speed_forces import are_by_speed
 from host.diagnosis.trims import retrimmed
-from host.diagnosis.workers import Task
+from host.diagnosis.workers import Task, Workers
 from host.waves import is_sea, mean_moment
 
 MEAN_MOMENTS = 2.0  # of what it may be: four seas came to 1.0 to 1.3
@@ -80,6 +82,16 @@ def led_astray(calm: Search, best: Explanation) -> tuple[Search, Explanation] | 
     if not (calm.follows_no_free_run or are_by_speed(calm.fitter, likeliest.fit)):
         return None
     return _rough(calm, best, sets)
+
+
+def again_astray(
+    fitter: Fitter, workers: Workers, on_progress: Callable[[str], None], part: Explained
+) -> Explained:
+    """What was found so on a part of the recordings, on the whole of them."""
+    base, root = with_sea(fitter, fitter.base), with_sea(fitter, fitter.root)
+    search = Search(fitter, workers, on_progress, base, root, part.search)
+    best = search.run([again_under_forces(fitter, part.best)])
+    return Explained(best, search, leftover(fitter, best), None)
 
 
 def _among_forces(calm: Search, best: Explanation) -> list[Explanation]:

@@ -11,7 +11,7 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
 from host.diagnosis.search import LOST, SLIGHT, Search
-from host.diagnosis.seas import led_astray
+from host.diagnosis.seas import Explained, again_astray, led_astray
 from host.diagnosis.workers import Workers
 from host.gauss_newton import Point
 from host.output_error import output_error
@@ -60,6 +60,11 @@ def test_errors_of_the_speed_are_not_taken_for_physics() -> None:
     assert left.is_by_speed
     assert found.names == best.names
     known = dict(zip(found.fit.structure.names, found.fit.parameters.tolist(), strict=True))
+    # A part of long recordings is searched first: from what was found there the whole goes on among forces.
+    with Workers(fitter, 1) as workers:
+        whole = again_astray(fitter, workers, lambda _: None, Explained(found, led[0], left, None))
+    assert whole.best.names == found.names
+    assert whole.left.is_by_speed
     assert all(known[name] == pytest.approx(value, rel=0.15) for name, value in HULL.items() if name != "a2")
 
 
