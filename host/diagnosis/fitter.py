@@ -199,7 +199,7 @@ class Fitter:
             if name in structure.names:
                 values[structure.names.index(name)] = value
         initial = [
-            np.array([0.0, 0.0, _first(recording.pitch), _first(recording.depth)])
+            np.array([0.0, 0.0, first_known(recording.pitch), first_known(recording.depth)])
             for recording in self.recordings
         ]
         return Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0]))
@@ -287,5 +287,6 @@ class Fitter:
         return filter_error_from(start, inputs, free, holds_noise=holds_noise)
 
 
-def _first(values: Array) -> float:
-    return float(values[np.isfinite(values)][0])
+def first_known(values: Array) -> float:
+    """The first that was measured; 0 where none was."""
+    return next((float(value) for value in values if np.isfinite(value)), 0.0)

@@ -5,18 +5,14 @@ from dataclasses import replace
 import numpy as np
 
 from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import first_known
 from host.kalman import kalman_pass
 from host.predict import SETTLING_SPAN
 from host.propagate import inputs_of
 from host.recording import Array, Recording
 from host.sensitivities import steered_run
 
-FIRST_SPREAD = (
-    0.5,
-    0.5,
-    0.2,
-    2.0,
-)  # of w, m/s, q, rad/s, theta, rad, and zeta, m: the filter begins anywhere
+FIRST_SPREAD = (0.5, 0.5, 0.2, 2.0)  # of w, q, theta and zeta, SI: the filter begins anywhere
 
 
 def foretold_errors(explanation: Explanation, recording: Recording, horizon: float) -> Array:
@@ -27,8 +23,7 @@ def foretold_errors(explanation: Explanation, recording: Recording, horizon: flo
     """
     fit, time = explanation.fit, recording.time
     inputs = inputs_of(recording, fit.structure)
-    first = [values[np.isfinite(values)][:1].sum() for values in (recording.pitch, recording.depth)]
-    initial = np.array([0.0, 0.0, *first])
+    initial = np.array([0.0, 0.0, first_known(recording.pitch), first_known(recording.depth)])
     spread = np.zeros(len(fit.structure.states))
     spread[: initial.size] = np.square(FIRST_SPREAD)
     followed = kalman_pass(fit.parameters, initial, fit.noise, inputs, spread)

@@ -12,6 +12,7 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.locate import locate
 from host.diagnosis.scoring import free_run_errors, misfit
+from host.diagnosis.sea_fits import levels
 from host.diagnosis.spans import divide
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.equations import NAMES, Slot
@@ -36,6 +37,8 @@ def against_model(found: Diagnosis, model: VehicleModel, name: str) -> Answer:
     recordings = found.recordings
     base = _as_it_is(model, recordings)
     fitter = Fitter(recordings, known=found.extended)
+    if found.horizon is not None:  # it is foretold from where a filter is, with forces of its own
+        base = replace(base, fit=replace(base.fit, noise=levels(fitter, base.names, base.fit)))
     comparison = compare(fitter, found.extended, _side(model))
     known = {effect.name: effect for effect in found.effects}
     effects = [_named(one, known) for one in comparison.named("missing", "different") if one.name in BY_NAME]
@@ -49,7 +52,7 @@ def against_model(found: Diagnosis, model: VehicleModel, name: str) -> Answer:
         verdict=verdict,
         base=base,
         # A model that knew none of the recording starts anew with each stretch.
-        base_misfit=misfit(base, replace(divide(recordings), unseen=[]), found.floor),
+        base_misfit=misfit(base, replace(divide(recordings), unseen=[]), found.floor, found.horizon),
         effects=effects,
         slots=_slots(comparison) or found.slots,
         location=locate(longest, errors, found.floor, model.values["u0"]),

@@ -90,10 +90,10 @@ def with_regular_waves(fitter: Fitter, explanation: Explanation) -> Explanation:
     best = max(fits, key=lambda fit: fit.log_likelihood)
     point = Point(best.structure, best.parameters, best.initial, best.noise)
     regular = output_error(point, inputs, own)
-    return fitter.explained(names, replace(regular, noise=_levels(fitter, names, regular)))
+    return fitter.explained(names, replace(regular, noise=levels(fitter, names, regular)))
 
 
-def _levels(fitter: Fitter, names: Names, fit: Fit) -> Array:
+def levels(fitter: Fitter, names: Names, fit: Fit) -> Array:
     """The noise of a predictor with these parameters under white forces."""
     held = replace(fit, free=np.zeros_like(fit.free))
     return filter_error(held, fitter.inputs(names, for_filter=True)).noise

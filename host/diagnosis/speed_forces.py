@@ -23,10 +23,10 @@ def are_by_speed(fitter: Fitter, fit: Fit) -> bool:
     """Whether the random forces of a fit are no more than the errors of the measured speed account for."""
     if not fit.has_process_noise or fit.waves.any() or not fitter.recordings[0].has_speed:
         return False
-    return bool((fit.noise[2:] < SPEED_DOUBT * _densities(fitter, fit)).all())
+    return bool((fit.noise[2:] < SPEED_DOUBT * densities(fitter, fit)).all())
 
 
-def _densities(fitter: Fitter, fit: Fit) -> Array:
+def densities(fitter: Fitter, fit: Fit) -> Array:
     """Spectral densities (2,) of force, (m/s^2)^2 s, and moment, (rad/s^2)^2 s, by the speed's errors."""
     p = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
     names = frozenset(effect.name for effect in fit.structure.effects)

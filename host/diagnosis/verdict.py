@@ -22,8 +22,8 @@ MOST_RARE = 2  # effects at once that not every vehicle has
 FAINT_WAVES = 30.0  # of BIC over all else: what a late hull imitates reaches about half of that
 BY_SEA = " Random forces act as well (waves, current, turbulence); they are part of the noise model."
 BY_SPEED = (
-    " This hull is unstable, at rest or as it turns: the errors of the measured speed lead any free run away "
-    "from the recording, as small random forces would, and as such they are part of the noise model."
+    " The errors of the measured speed lead a free run away from the recording, as small random forces "
+    "would, most of all that of a hull which is unstable by itself; as such they are part of the noise model."
 )
 CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
 

@@ -54,6 +54,17 @@ def test_an_effect_the_model_lacks_is_missing_and_its_force_is_shown(coupled: Di
     assert np.corrcoef(answer.found.force.values[0], smooth)[0, 1] > 0.7
 
 
+def test_where_seconds_are_foretold_so_are_those_of_the_model(coupled: Diagnosis) -> None:
+    found = replace(coupled, horizon=2.0)
+    true, lacking = (
+        against_model(found, given(found, effects), "m.json").found.base_misfit
+        for effects in ({"heave_pitch_rate_coupling": {"c_wq": 0.8}}, {})
+    )
+    whole = against_model(coupled, given(coupled, {}), "m.json").found.base_misfit
+    assert true.chi2 < 1.5
+    assert true.chi2 < lacking.chi2 < 0.8 * whole.chi2
+
+
 def test_a_coefficient_that_differs_is_told_with_both_values(coupled: Diagnosis) -> None:
     answer = against_model(coupled, given(coupled, {"heave_pitch_rate_coupling": {"c_wq": 0.2}}), "m.json")
     assert answer.against is not None

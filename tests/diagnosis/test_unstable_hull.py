@@ -12,6 +12,7 @@ from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
 from host.diagnosis.search import LOST, SLIGHT, Search
 from host.diagnosis.seas import Explained, again_astray, led_astray
+from host.diagnosis.speed_forces import densities
 from host.diagnosis.workers import Workers
 from host.gauss_newton import Point
 from host.output_error import output_error
@@ -58,6 +59,8 @@ def test_errors_of_the_speed_are_not_taken_for_physics() -> None:
     left = leftover(fitter, found)
     assert left.is_nothing
     assert left.is_by_speed
+    # The moment's density is foretold, not only bounded.
+    assert 0.3 < found.fit.noise[3] / densities(fitter, found.fit)[1] < 3.0
     assert found.names == best.names
     known = dict(zip(found.fit.structure.names, found.fit.parameters.tolist(), strict=True))
     # A part of long recordings is searched first: from what was found there the whole goes on among forces.
