@@ -1,57 +1,61 @@
 """A CasADi function evaluated at all rows at once.
 
 CasADi's own evaluation goes through the function's instructions once for every row; here each instruction
-is carried out once, by NumPy, on all rows: several times quicker, where no row needs the one before.
+is carried out on many rows, where no row needs the one before: compiled where the computer has a C compiler,
+else by NumPy, which takes several times longer and differs by rounding.
 """
 
+import ctypes
 from collections.abc import Callable
+from functools import cache
+from importlib.resources import files
 from typing import Any
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
+from host.machine_code import compiled
 from host.recording import Array
 
-MOST_ROWS = 4096  # at once: the intermediate results of more would not stay in a cache
-ALONE = -1  # in place of the second operand of an operation that has one
+MOST_ROWS = 4096  # at once by NumPy: the intermediate results of more would not stay in a cache
+BLOCK = 64  # rows at once where it is compiled, as in all_rows.c
+# As wide as this computer can, if the compiler knows how.
+EFFORTS = (("-O3", "-fopenmp-simd", "-march=native"), ("-O3", "-fopenmp-simd"), ("-O3",))
 
-
-def _same(value: Array | float) -> Array | float:
-    return value
-
-
-_OPERATIONS: dict[int, Callable[..., Any]] = {
-    ca.OP_ADD: np.add,
-    ca.OP_SUB: np.subtract,
-    ca.OP_MUL: np.multiply,
-    ca.OP_DIV: np.divide,
-    ca.OP_NEG: np.negative,
-    ca.OP_SQ: np.square,
-    ca.OP_SQRT: np.sqrt,
-    ca.OP_TWICE: lambda x: x + x,
-    ca.OP_INV: np.reciprocal,
-    ca.OP_EXP: np.exp,
-    ca.OP_LOG: np.log,
-    ca.OP_POW: np.power,
-    ca.OP_CONSTPOW: np.power,
-    ca.OP_SIN: np.sin,
-    ca.OP_COS: np.cos,
-    ca.OP_TAN: np.tan,
-    ca.OP_TANH: np.tanh,
-    ca.OP_FABS: np.abs,
-    ca.OP_SIGN: np.sign,
-    ca.OP_FMIN: np.fmin,
-    ca.OP_FMAX: np.fmax,
-    ca.OP_LT: lambda x, y: 1.0 * (x < y),
-    ca.OP_LE: lambda x, y: 1.0 * (x <= y),
-    ca.OP_EQ: lambda x, y: 1.0 * (x == y),
-    ca.OP_NE: lambda x, y: 1.0 * (x != y),
-    ca.OP_NOT: lambda x: 1.0 * (x == 0.0),
-    ca.OP_AND: lambda x, y: 1.0 * ((x != 0.0) & (y != 0.0)),
-    ca.OP_OR: lambda x, y: 1.0 * ((x != 0.0) | (y != 0.0)),
-    ca.OP_IF_ELSE_ZERO: lambda x, y: np.where(x, y, 0.0),
-    ca.OP_ASSIGN: _same,
-}
+_OPERATIONS: tuple[tuple[tuple[int, ...], Callable[..., Any]], ...] = (
+    ((ca.OP_ASSIGN, ca.OP_OUTPUT), lambda x, _: x),
+    ((ca.OP_ADD,), np.add),
+    ((ca.OP_SUB,), np.subtract),
+    ((ca.OP_MUL,), np.multiply),
+    ((ca.OP_DIV,), np.divide),
+    ((ca.OP_NEG,), lambda x, _: np.negative(x)),
+    ((ca.OP_SQ,), lambda x, _: np.square(x)),
+    ((ca.OP_SQRT,), lambda x, _: np.sqrt(x)),
+    ((ca.OP_TWICE,), lambda x, _: x + x),
+    ((ca.OP_INV,), lambda x, _: np.reciprocal(x)),
+    ((ca.OP_EXP,), lambda x, _: np.exp(x)),
+    ((ca.OP_LOG,), lambda x, _: np.log(x)),
+    ((ca.OP_POW, ca.OP_CONSTPOW), np.power),
+    ((ca.OP_SIN,), lambda x, _: np.sin(x)),
+    ((ca.OP_COS,), lambda x, _: np.cos(x)),
+    ((ca.OP_TAN,), lambda x, _: np.tan(x)),
+    ((ca.OP_TANH,), lambda x, _: np.tanh(x)),
+    ((ca.OP_FABS,), lambda x, _: np.abs(x)),
+    ((ca.OP_SIGN,), lambda x, _: np.sign(x)),
+    ((ca.OP_FMIN,), np.fmin),
+    ((ca.OP_FMAX,), np.fmax),
+    ((ca.OP_LT,), lambda x, y: 1.0 * (x < y)),
+    ((ca.OP_LE,), lambda x, y: 1.0 * (x <= y)),
+    ((ca.OP_EQ,), lambda x, y: 1.0 * (x == y)),
+    ((ca.OP_NE,), lambda x, y: 1.0 * (x != y)),
+    ((ca.OP_NOT,), lambda x, _: 1.0 * (x == 0.0)),
+    ((ca.OP_AND,), lambda x, y: 1.0 * ((x != 0.0) & (y != 0.0))),
+    ((ca.OP_OR,), lambda x, y: 1.0 * ((x != 0.0) | (y != 0.0))),
+    ((ca.OP_IF_ELSE_ZERO,), lambda x, y: np.where(x, y, 0.0)),
+)
+"""CasADi's codes and the operation, in the order of all_rows.c."""
+_NUMBERS = {code: number for number, (codes, _) in enumerate(_OPERATIONS) for code in codes}
 
 
 class AllRows:
@@ -61,55 +65,114 @@ class AllRows:
     """
 
     def __init__(self, function: ca.Function) -> None:
-        self._work: list[Array | float] = [0.0] * function.sz_w()
-        self._program: list[tuple[Callable[..., Any], int, int, int]] = []
-        self._given: list[tuple[int, int, int]] = []  # argument, component, place
-        self._results: list[tuple[int, int, int, int]] = []  # result, row, column, place
-        shapes = [function.sparsity_out(k) for k in range(function.n_out())]
-        self._shapes = [sparsity.shape for sparsity in shapes]
-        entries = [list(zip(*sparsity.get_triplet(), strict=True)) for sparsity in shapes]
-        # CasADi uses a place again once it is free; what is given or constant gets one for good.
-        now_at = list(range(len(self._work)))
+        places = function.sz_w()
+        self._shapes = [function.sparsity_out(k).shape for k in range(function.n_out())]
+        entries = [
+            list(zip(*function.sparsity_out(k).get_triplet(), strict=True)) for k in range(function.n_out())
+        ]
+        self._constants: dict[int, float] = {}
+        inputs: list[tuple[int, int, int]] = []  # argument, component, place
+        outputs: list[tuple[int, int, int, int]] = []  # result, row, column, place
+        program: list[tuple[int, int, int, int]] = []
+        # CasADi uses a place again once it is free; what is given, constant or a result gets one for good.
+        now_at = list(range(places))
         for step in range(function.n_instructions()):
             code, taken = function.instruction_id(step), function.instruction_output(step)
+            if code == ca.OP_CONST:
+                now_at[taken[0]] = places
+                self._constants[places] = function.instruction_constant(step)
+                places += 1
+                continue
             given = function.instruction_input(step)
             if code == ca.OP_INPUT:
-                now_at[taken[0]] = self._new_place()
-                self._given.append((given[0], given[1], now_at[taken[0]]))
-            elif code == ca.OP_CONST:
-                now_at[taken[0]] = self._new_place()
-                self._work[now_at[taken[0]]] = function.instruction_constant(step)
+                now_at[taken[0]] = places
+                inputs.append((given[0], given[1], places))
+                places += 1
             elif code == ca.OP_OUTPUT:
-                result, entry = taken
-                place = self._new_place()
-                self._results.append((result, *entries[result][entry], place))
-                self._program.append((_same, now_at[given[0]], ALONE, place))
-            elif code in _OPERATIONS:
-                one, other = [*(now_at[place] for place in given), ALONE][:2]
+                outputs.append((taken[0], *entries[taken[0]][taken[1]], places))
+                program.append((_NUMBERS[code], now_at[given[0]], now_at[given[0]], places))
+                places += 1
+            elif code in _NUMBERS:
+                one, other = now_at[given[0]], now_at[given[-1]]
                 now_at[taken[0]] = taken[0]
-                self._program.append((_OPERATIONS[code], one, other, taken[0]))
+                program.append((_NUMBERS[code], one, other, taken[0]))
             else:
                 raise NotImplementedError(f"CasADi's operation {code} over all rows")
+        self._places = places
+        self._program = np.array(program, dtype=np.intp).reshape(-1, 4)
+        self._given = np.array(inputs, dtype=np.intp).reshape(-1, 3)
+        self._results = np.array(outputs, dtype=np.intp).reshape(-1, 4)
 
     def __call__(self, *arguments: Array) -> list[Array]:
         """The results, each (N, rows, columns)."""
         count = max(argument.shape[1] for argument in arguments if argument.ndim == 2)
         results = [np.zeros((count, *shape)) for shape in self._shapes]
+        if (run := _compiled()) is not None:
+            self._by_machine(run, count, arguments, results)
+        else:
+            self._by_numpy(count, arguments, results)
+        return results
+
+    def _by_machine(
+        self, run: Callable[..., None], count: int, arguments: tuple[Array, ...], results: list[Array]
+    ) -> None:
+        # At the start of a cache line: where every access crosses two, it takes three times as long.
+        room = np.empty(self._places * BLOCK + 8)
+        work = room[-(room.ctypes.data // 8) % 8 :][: self._places * BLOCK].reshape((-1, BLOCK))
+        for place, value in self._constants.items():
+            work[place] = value
+        values = [np.ascontiguousarray(argument, dtype=float) for argument in arguments]
+        argument, component, given = self._given.T
+        result, row, column, told = self._results.T
+        # Numbers from one component to the next, and from one row of the recording to the next.
+        across = np.array([value.shape[-1] if value.ndim == 2 else 1 for value in values])[argument]
+        along = np.array([value.ndim - 1 for value in values])[argument]
+        wide, size = np.array([(columns, rows * columns) for rows, columns in self._shapes])[result].T
+        run(
+            count,
+            len(self._program),
+            self._program.ctypes.data,
+            work.ctypes.data,
+            *_columns(given, _addresses(values)[argument] + 8 * component * across, along),
+            *_columns(told, _addresses(results)[result] + 8 * (row * wide + column), size),
+        )
+
+    def _by_numpy(self, count: int, arguments: tuple[Array, ...], results: list[Array]) -> None:
+        program: list[list[int]] = self._program.tolist()
         for first in range(0, count, MOST_ROWS):
             here = slice(first, first + MOST_ROWS)
-            work = self._work.copy()
-            for argument, component, place in self._given:
+            work: list[Array | float] = [0.0] * self._places
+            for place, constant in self._constants.items():
+                work[place] = constant
+            for argument, component, place in self._given.tolist():
                 value = arguments[argument][component]
                 work[place] = value[here] if value.ndim else float(value)
             with np.errstate(all="ignore"):  # a run that leaves the numbers is seen by its size
-                for operation, one, other, place in self._program:
-                    work[place] = (
-                        operation(work[one]) if other == ALONE else operation(work[one], work[other])
-                    )
-            for result, row, column, place in self._results:
+                for number, one, other, place in program:
+                    work[place] = _OPERATIONS[number][1](work[one], work[other])
+            for result, row, column, place in self._results.tolist():
                 results[result][here, row, column] = work[place]
-        return results
 
-    def _new_place(self) -> int:
-        self._work.append(0.0)
-        return len(self._work) - 1
+
+def _addresses(arrays: list[Array]) -> NDArray[np.intp]:
+    return np.array([array.ctypes.data for array in arrays], dtype=np.intp)
+
+
+def _columns(*parts: NDArray[np.intp]) -> tuple[int, NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """How many columns, their places, their addresses, and how many numbers apart their rows are."""
+    places, addresses, apart = (np.ascontiguousarray(part, dtype=np.intp) for part in parts)
+    return places.size, places, addresses, apart
+
+
+@cache
+def _compiled() -> Callable[..., None] | None:
+    source = files("host").joinpath("all_rows.c").read_text(encoding="utf-8")
+    library = compiled(source, ctypes.CDLL, *EFFORTS)
+    if library is None:
+        return None
+    size, pointer, numbers = ctypes.c_ssize_t, ctypes.c_void_p, np.ctypeslib.ndpointer(np.intp)
+    columns: list[Any] = [size, numbers, numbers, numbers]
+    library.all_rows.argtypes = [size, size, pointer, pointer, *columns, *columns]
+    library.all_rows.restype = None
+    run: Callable[..., None] = library.all_rows
+    return run

@@ -11,6 +11,7 @@ from bridge.measurement_gate import LARGEST
 from host.csv_map import UNITS, CsvColumn, CsvMap
 from host.errors import RecordingError
 from host.recording import NEEDED, Array, Recording, file_sha256, split_at_gaps
+from host.resampled import readings_alone
 
 CHANNELS = ("depth", "pitch", "rudder", "speed", "pitch_rate")
 _MANY = 0.1  # share of a column
@@ -20,8 +21,9 @@ def read_csv_recording(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEE
     """Reads a text recording, separated by comma, semicolon or tab; several stretches when it has gaps.
 
     Rows whose time is missing, repeated or runs backwards are dropped and counted; any other cell that is
-    empty or not a finite number is "not measured". Raises RecordingError with one line when the file is
-    empty, is no text, lacks a column, or holds no usable stretch.
+    empty or not a finite number is "not measured", and so is what only fills a row between two readings.
+    Raises RecordingError with one line when the file is empty, is no text, lacks a column, or holds no usable
+    stretch.
     """
     header, rows, decimal = _read_rows(path)
     counts: Counter[str] = Counter(rows=len(rows))
@@ -62,7 +64,7 @@ def read_csv_recording(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEE
         has_angle=columns.rudder.unit != "raw" or columns.rudder.scale != 1.0,
         counts=counts,
     )
-    pieces = split_at_gaps(whole, max(1.0, 2.5 * step), needs)
+    pieces = split_at_gaps(readings_alone(whole), max(1.0, 2.5 * step), needs)
     if not pieces:
         raise RecordingError(
             f"{path}: no stretch of 10 rows has {', '.join(needs)} together ({_summary(counts)})"

@@ -14,7 +14,7 @@ import numpy as np
 from host.machine_code import compiled
 from host.recording import Array
 
-EFFORT = "-O3"  # so that the columns are done several at a time
+EFFORT = ("-O3",)  # so that the columns are done several at a time
 
 
 def linear_recursion(F: Array, G: Array, start: Array) -> Array:

@@ -17,6 +17,7 @@ import casadi as ca
 
 # No product and sum may be rounded at once, as some compilers do by themselves.
 FLAGS = ("-fPIC", "-shared", "-ffp-contract=off")
+PLAIN = ("-O1",)  # more takes longer than it saves
 LONGEST = 60.0  # s, a compiler may take
 
 T = TypeVar("T")
@@ -29,20 +30,27 @@ def compiler() -> str | None:
     return next((one for one in found if _made_by(one, "int works = 1;", ctypes.CDLL)), None)
 
 
-def compiled(source: str, load: Callable[[str], T], effort: str = "-O1") -> T | None:
+def compiled(source: str, load: Callable[[str], T], *efforts: tuple[str, ...]) -> T | None:
     """What `load` makes of a library compiled from C; None where there is no compiler, or it refuses.
 
     The library's file may go once it is loaded.
+
+    efforts  options, of which the first that the compiler takes are used
     """
     found = compiler()
-    return None if found is None else _made_by(found, source, load, effort)
+    if found is None:
+        return None
+    made = (_made_by(found, source, load, effort) for effort in efforts or (PLAIN,))
+    return next((one for one in made if one is not None), None)
 
 
-def _made_by(compiler: str, source: str, load: Callable[[str], T], effort: str = "-O1") -> T | None:
+def _made_by(
+    compiler: str, source: str, load: Callable[[str], T], effort: tuple[str, ...] = PLAIN
+) -> T | None:
     with TemporaryDirectory() as folder:
         text, library = Path(folder, "source.c"), Path(folder, "library.so")
         text.write_text(source, encoding="utf-8")
-        command = [compiler, effort, *FLAGS, "-o", str(library), str(text)]
+        command = [compiler, *effort, *FLAGS, "-o", str(library), str(text)]
         try:
             subprocess.run(
                 command, check=True, stdin=subprocess.DEVNULL, capture_output=True, timeout=LONGEST

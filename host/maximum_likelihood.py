@@ -20,7 +20,7 @@ from host.gauss_newton import Point
 from host.noise_floor import noise_floor, resolution
 from host.output_error import SMALLEST_NOISE, output_error
 from host.propagate import Inputs, inputs_of
-from host.recording import Array, Recording
+from host.recording import Array, Recording, mean_speed
 from host.rounding import thinned
 from host.speed_error import speed_errors
 from host.start_values import start_values
@@ -55,7 +55,7 @@ def fit_maximum_likelihood(
     """
     held = dict(held) if held is not None else {}
     if recordings[0].has_speed:
-        held["u0"] = float(np.mean([r.speed.mean() for r in recordings]))
+        held["u0"] = mean_speed(recordings)
     free = np.array([name not in held for name in structure.names])
     floor = noise_floor(recordings)
     errors, steps = speed_errors(recordings, floor[1], resolution(recordings))

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from host.recording import Array, Recording, with_whole_speed
+from host.recording import Array, Recording
 
 CHANNELS = ("depth", "pitch", "speed", "pitch_rate")
 WINDOW = 13  # values
@@ -38,7 +38,7 @@ Found = dict[str, Mask]
 
 
 def without_outliers(recordings: list[Recording]) -> list[Recording]:
-    """The recordings with their spikes "not measured"; a speed is bridged there, as its losses are.
+    """The recordings with their spikes "not measured".
 
     `counts` and `notes` say of each file how many: "outlier.depth" and so on.
     """
@@ -52,10 +52,9 @@ def without_outliers(recordings: list[Recording]) -> list[Recording]:
             for name, mask in spikes.items()
             if mask.any()
         }
-        spoilt = replace(
-            recording, **values, counts=recording.counts + counts, notes=(*recording.notes, *notes)
+        cleaned.append(
+            replace(recording, **values, counts=recording.counts + counts, notes=(*recording.notes, *notes))
         )
-        cleaned.append(with_whole_speed(spoilt) if "speed" in values else spoilt)
     return cleaned
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 NEEDED = ("depth", "pitch", "rudder")
+LONGEST_BETWEEN_SPEEDS = 2.5  # s, between two readings: a manoeuvre slows the vehicle within a few
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,7 +21,7 @@ class Recording:
     depth       m, positive down
     pitch       rad, positive nose up
     rudder      rad, stern plane, held constant until the next row; never NaN
-    speed       m/s through the water; all NaN where the vehicle has no speed sensor
+    speed       m/s through the water, as measured; all NaN where the vehicle has no speed sensor
     pitch_rate  rad/s; all NaN where it is not recorded
     step        s, nominal interval
     has_angle   whether rudder is an angle in rad; False for another actuator in a unit of its own
@@ -47,7 +48,7 @@ class Recording:
 
     @property
     def has_speed(self) -> bool:
-        return bool(np.isfinite(self.speed).all())
+        return bool(np.isfinite(self.speed).any())
 
     @property
     def duration(self) -> float:
@@ -104,18 +105,25 @@ def split_at_gaps(
             },
         )
         if of_piece.sum() >= 10 and all(np.isfinite(getattr(piece, name)).any() for name in needs):
-            pieces.append(with_whole_speed(piece))
+            pieces.append(_with_useful_speed(piece))
     return pieces
 
 
-def with_whole_speed(piece: Recording) -> Recording:
-    """Speed varies slowly: short losses are bridged linearly, a speed missing half the time is no speed."""
-    known = np.isfinite(piece.speed)
-    if known.mean() < 0.5:
-        return replace(piece, speed=np.full_like(piece.speed, np.nan))
-    if known.all():
-        return piece
-    return replace(piece, speed=np.interp(piece.time, piece.time[known], piece.speed[known]))
+def _with_useful_speed(piece: Recording) -> Recording:
+    """Speed varies slowly, so its sensor may be slow; one that is silent half of the time tells none."""
+    known = np.flatnonzero(np.isfinite(piece.speed))
+    steps = np.diff(piece.time[known])
+    if known.size and steps[steps <= LONGEST_BETWEEN_SPEEDS].sum() < 0.5 * piece.duration:
+        note = "the speed is known in less than half of the time, so none is taken as measured"
+        return replace(
+            piece, speed=np.full_like(piece.speed, np.nan), notes=tuple(dict.fromkeys((*piece.notes, note)))
+        )
+    return piece
+
+
+def mean_speed(recordings: list[Recording]) -> float:
+    """m/s, of those recordings that have a speed, of which there must be one."""
+    return float(np.mean([np.nanmean(each.speed) for each in recordings if each.has_speed]))
 
 
 def notes_of(recordings: list[Recording]) -> list[str]:

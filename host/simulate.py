@@ -12,6 +12,7 @@ from host.plane_between_rows import with_moving_plane
 from host.predict import SETTLING_SPAN, estimate_initial_state
 from host.propagate import Run, free_run, inputs_of
 from host.recording import Array, Recording
+from host.speed import smoothed_speed
 
 COLUMNS = ("time_s", "depth_m", "pitch_rad", "rudder_rad", "speed_mps", "pitch_rate_radps", "heave_mps")
 
@@ -39,7 +40,8 @@ def simulate(model: VehicleModel, recording: Recording) -> Simulation:
         initial = estimate_initial_state(model.parameters, opening, inputs)
     else:
         initial = np.zeros(4)
-    speed = recording.speed if recording.has_speed else np.full(recording.time.size, model.values["u0"])
+    rows = recording.time.size
+    speed = smoothed_speed(cleaned.speed).speed if cleaned.has_speed else np.full(rows, model.values["u0"])
     return Simulation(
         time=recording.time,
         run=free_run(model.parameters, initial, inputs),

@@ -23,6 +23,21 @@ class SmoothedSpeed(NamedTuple):
 
 
 def smoothed_speed(measured: Array) -> SmoothedSpeed:
+    """Most likely speed at N rows, of which it was measured at some, NaN at the others.
+
+    A sensor slower than the rows has samples of its own: they are smoothed as evenly spaced, and what lies
+    between two of them is on the straight line.
+    """
+    known = np.flatnonzero(np.isfinite(measured))
+    found = _smoothed(measured[known])
+    if known.size == measured.size:
+        return found
+    speed = np.interp(np.arange(measured.size), known, found.speed)
+    spacing = (known[-1] - known[0]) / max(known.size - 1, 1)
+    return SmoothedSpeed(speed, found.variance, found.decay ** (1.0 / max(spacing, 1.0)))
+
+
+def _smoothed(measured: Array) -> SmoothedSpeed:
     """Most likely speed (N,) when it wanders at random (variance q a row) under white noise (variance r).
 
     In cosine transforms both are independent: y_k ~ r + q / d_k, d_k = 2 - 2 cos(pi k / N), and the mean

@@ -13,7 +13,8 @@ from scipy.linalg import expm
 from scipy.optimize import minimize, minimize_scalar
 from scipy.signal import lfilter
 
-from host.recording import Array, Recording
+from host.recording import Array, Recording, mean_speed
+from host.speed import smoothed_speed
 
 LARGEST_FIT = 4000  # rows used per linear fit; more only cost time
 REST = 1e-3  # weight of an initial state of zero, in residuals: 1 mrad or 1 mm for a whole rad/s or m/s
@@ -30,7 +31,7 @@ class _Stretch:
             np.searchsorted(recording.time, at + self.step / 2, side="right") - 1, 0, recording.time.size - 1
         )
         self.rudder = recording.rudder[row]
-        self.speed = recording.speed[row] if recording.has_speed else None
+        self.speed = smoothed_speed(recording.speed).speed[row] if recording.has_speed else None
         self.pitch_rows, self.pitch = self._measured(recording, recording.pitch, thinning)
         self.depth_rows, self.depth = self._measured(recording, recording.depth, thinning)
         self.count = count
@@ -158,7 +159,7 @@ def start_values(recordings: list[Recording]) -> list[tuple[Array, list[Array]]]
     stretches = [_Stretch(r, 1 + rows // LARGEST_FIT) for r in recordings]
     longest = max(s.step * s.count for s in stretches)
     slowest, fastest = 2.0 * np.pi / longest, min(0.7 * np.pi / max(s.step for s in stretches), 30.0)
-    speed = float(np.mean([r.speed.mean() for r in recordings])) if recordings[0].has_speed else None
+    speed = mean_speed(recordings) if recordings[0].has_speed else None
     best = []
     for frequency, damping in _pitch_valleys(stretches, slowest, fastest):
         a2, a3 = -2.0 * damping * frequency, -(frequency**2)

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from host.recording import Array, Recording
+from host.speed import smoothed_speed
 
 SMOOTHING = 0.35  # s, width of the Gaussian; shorter than the motion, long against a sample
 
@@ -77,7 +78,7 @@ def smoothed_motion(recording: Recording, speed: float) -> Columns:
     theta, depth = filled(recording.pitch), filled(recording.depth)
     datum = depth.mean()  # the kernel of a derivative sums to zero only nearly
     depth = depth - datum
-    u = recording.speed if recording.has_speed else np.full(theta.size, speed)
+    u = smoothed_speed(recording.speed).speed if recording.has_speed else np.full(theta.size, speed)
     return {
         "w": derived(depth, 1) + u * np.sin(derived(theta, 0)),
         "dw": derived(depth, 2) + u * derived(theta, 1),

@@ -24,7 +24,7 @@ from host.maximum_likelihood import fit_maximum_likelihood
 from host.noise_floor import noise_floor, resolution
 from host.output_error import annealed, free_run_cost, output_error
 from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
-from host.recording import Array, Recording
+from host.recording import Array, Recording, mean_speed
 from host.rounding import NO_STEPS, thinned
 from host.speed_error import speed_errors
 from host.valleys import (
@@ -63,7 +63,7 @@ class Fitter:
         self.accelerations = accelerations(self.thinned)
         self.held = dict(HELD)
         if recordings[0].has_speed:
-            self.held["u0"] = float(np.mean([r.speed.mean() for r in recordings]))
+            self.held["u0"] = mean_speed(recordings)
             # Where the speed is measured its loss is data, and there is nothing in it to estimate.
             self.held |= {name: 0.0 for name in ("c_ud", "c_uq", "speed_step")} | {"speed_time": 1.0}
             self.held["speed_change_time"] = 0.0

@@ -21,6 +21,7 @@ from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
 from host.errors import RecordingError
 from host.recording import Array, Recording
+from host.speed import smoothed_speed
 
 SEED = 0
 QUIET = 0.1  # of the sensors' noise, with which the coefficients of a simulation are measured
@@ -128,7 +129,7 @@ def _seen(recording: Recording, one: Recording, floor: Array, rng: np.random.Gen
     pitch, depth = (_at(one, values, recording.time) for values in (one.pitch, one.depth))
     speed = np.full(recording.time.size, np.nan)
     if recording.has_speed and one.has_speed:
-        speed = np.interp(recording.time, one.time, one.speed)
+        speed = np.interp(recording.time, one.time, smoothed_speed(one.speed).speed)
     return replace(
         recording,
         name=one.name,

@@ -23,7 +23,7 @@ from host.filter_error import whitened_innovations
 from host.gauss_newton import GaussNewton, Point
 from host.output_error import residuals_at
 from host.propagate import LONGEST_SUBSTEP, Inputs, free_run, inputs_of
-from host.recording import Array, Recording
+from host.recording import Array, Recording, mean_speed
 
 SEPARATES = 2.0 * TWIN_MARGIN  # predicted chi2 that leaves no doubt after chance had its share
 MOST_FLOWN = 2  # manoeuvres, in simulation
@@ -254,7 +254,7 @@ def _blank(flown: Manoeuvre, like: Recording) -> Recording:
         depth=nan,
         pitch=nan,
         pitch_rate=nan,
-        speed=np.full(rows, float(np.mean(like.speed))) if like.has_speed else nan,
+        speed=np.full(rows, mean_speed([like])) if like.has_speed else nan,
         rudder=flown.rudder,
         step=flown.step,
     )

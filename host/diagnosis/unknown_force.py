@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from host.recording import Array, Recording
+from host.recording import Array, Recording, mean_speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ def unknown_force(
     accelerations  rms of w', q': the force may wander by so much in a second
     """
     h = recording.step
-    u = float(np.nanmean(recording.speed)) if recording.has_speed else base["u0"]
+    u = mean_speed([recording]) if recording.has_speed else base["u0"]
     A = np.zeros((7, 7))
     A[0, [0, 4, 6]] = base["a1"], 1.0, base["b1"]
     A[1, [1, 2, 5, 6]] = base["a2"], base["a3"], 1.0, base["b2"]

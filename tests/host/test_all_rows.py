@@ -34,3 +34,14 @@ def test_an_unknown_operation_is_refused() -> None:
     x = ca.SX.sym("x")
     with pytest.raises(NotImplementedError, match="operation"):
         AllRows(ca.Function("erf", [x], [ca.erf(x)]))
+
+
+def test_it_is_the_same_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+    x, p = ca.SX.sym("x", 3), ca.SX.sym("p", 2)
+    matrix = ca.jacobian(ca.vertcat(ca.exp(x[0]) * p[0], ca.sin(x[1] * x[2]) / p[1]), x)
+    every = AllRows(ca.Function("both", [x, p], [matrix, x[0] + p[1]]))
+    rows, parameters = np.random.default_rng(1).normal(size=(3, 150)), np.array([0.7, -1.3])
+    with_one = every(rows, parameters)
+    monkeypatch.setattr("host.all_rows._compiled", lambda: None)
+    for one, other in zip(with_one, every(rows, parameters), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-15)

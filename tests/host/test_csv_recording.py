@@ -77,14 +77,19 @@ def test_time_running_backwards_and_repeated_is_dropped_and_counted(tmp_path: Pa
     assert recording.counts["refused.time_missing"] == 1
 
 
-def test_speed_with_holes_is_bridged_and_mostly_missing_is_no_speed(tmp_path: Path) -> None:
-    lines = [f"{line},{'' if k % 3 == 0 else 2.0}" for k, line in enumerate(rows(30))]
+@pytest.mark.parametrize("every", [1, 3, 10, 20])
+def test_a_slow_speed_sensor_is_one(tmp_path: Path, every: int) -> None:
+    lines = [f"{line},{2.0 + 0.01 * k if k % every == 0 else ''}" for k, line in enumerate(rows(60))]
     (recording,) = read_csv_recording(write(tmp_path / "a.csv", lines, HEADER + ",speed_mps"), CsvMap())
     assert recording.has_speed
-    assert np.allclose(recording.speed, 2.0)
-    lines = [f"{line},{2.0 if k % 3 == 0 else ''}" for k, line in enumerate(rows(30))]
+    assert np.isfinite(recording.speed).sum() == -(-60 // every)
+
+
+def test_a_speed_that_is_silent_half_of_the_time_is_no_speed_and_that_is_said(tmp_path: Path) -> None:
+    lines = [f"{line},{2.0 if 20 <= k < 90 else ''}" for k, line in enumerate(rows(200))]
     (recording,) = read_csv_recording(write(tmp_path / "b.csv", lines, HEADER + ",speed_mps"), CsvMap())
     assert not recording.has_speed
+    assert any("speed" in note for note in recording.notes)
 
 
 @pytest.mark.parametrize(

@@ -35,3 +35,16 @@ def test_the_error_that_is_left_is_told() -> None:
     for lag in (1, 10):
         measured = float(np.mean(each[:, lag:] * each[:, :-lag]) / np.mean(each**2))
         assert told.decay**lag == pytest.approx(measured, abs=0.1)
+
+
+def test_a_slow_sensor_tells_as_much_with_empty_rows_between_its_readings() -> None:
+    rng = np.random.default_rng(4)
+    truth = 1.5 + 0.2 * np.sin(np.arange(4000) / 300.0)
+    readings = truth[::10] + 0.02 * rng.standard_normal(400)
+    rows = np.full(4000, np.nan)
+    rows[::10] = readings
+    alone, among = smoothed_speed(readings), smoothed_speed(rows)
+    assert among.speed[::10] == pytest.approx(alone.speed)
+    assert among.variance == alone.variance
+    assert among.decay**10 == pytest.approx(alone.decay)
+    assert np.sqrt(np.mean((among.speed - truth) ** 2)) < 0.01
