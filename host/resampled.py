@@ -6,6 +6,7 @@ a sensor without noise: physics would be named for the one, and evidence counted
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,8 @@ STRAIGHT, REGULAR = 0.3, 0.8  # shares of rows on a line, and of readings that c
 
 def readings_alone(recording: Recording) -> Recording:
     """The recording with what is repeated or lies between readings "not measured"; a note says where."""
-    values, notes = {}, []
+    values: dict[str, Any] = {}
+    notes: list[str] = []
     for name, words in CHANNELS.items():
         column = getattr(recording, name)
         for find, done in ((repeats, "repeats the last reading"), (between, "is on a line between readings")):
