@@ -19,7 +19,7 @@ from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import first_guess
 from host.diagnosis.margins import LITTLE, NAMING_MARGIN
 from host.diagnosis.prospects import gain, probed
-from host.diagnosis.starts import with_other_moments
+from host.diagnosis.starts import idle_values, with_other_moments
 from host.filter_error import filter_error_from
 from host.gauss_newton import Point
 from host.valleys import USUAL_SPEED, with_poles_swapped
@@ -41,7 +41,6 @@ SLIGHTLY = 1.05  # times the variance expected: enough for another look at the m
 FEW_STEPS, STEPS = 10, 40  # of the parameters at one stage: many lie along a ridge, where a stage is slow
 APPARENT = ("pitch_bias", "vertical_current")  # no constant force does the same where heave is not linear
 LOST = 2.0  # of BIC a sample, to the best stage: the last ones lead nowhere
-LIKELY = {"restoring_share": 1.0, "kinematics_share": 1.0, "pendulum_share": 1.0}  # sin, cos; a pendulum
 
 
 def continued(search: "Search", names: Names, most_beside: int) -> Explanation | None:
@@ -187,13 +186,6 @@ def _climbed(fitter: "Fitter", point: Point, steps: int) -> Explanation:
 
 def _begun(fitter: "Fitter", names: Names, speed: float) -> Point:
     """The values of a regression at this speed, those of most vehicles, or none: no set is needed."""
-    structure, root = structure_of(names), fitter.root.fit
-    rough = first_guess(fitter.thinned, speed, names)
-    values = dict(zip(root.structure.names, root.parameters.tolist(), strict=True))
-    for effect in structure.effects:
-        for parameter, probe in zip(effect.parameters, effect.probes[0], strict=True):
-            is_size = parameter.name in effect.size_names
-            values.setdefault(parameter.name, LIKELY.get(parameter.name, 0.0 if is_size else probe))
-    values |= {name: value for name, value in (rough | fitter.held).items() if name in values}
-    start = structure.clipped(np.array([values[name] for name in structure.names]))
-    return Point(structure, start, root.initial, root.levels)
+    root, rough = fitter.root.fit, first_guess(fitter.thinned, speed, names)
+    known = dict(zip(root.structure.names, root.parameters.tolist(), strict=True))
+    return Point(structure_of(names), idle_values(fitter, names, known | rough), root.initial, root.levels)

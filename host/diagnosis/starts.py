@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.catalogue import named
+from host.catalogue import named, structure_of
 from host.catalogue.kin import measure_alike
 from host.catalogue.moments import FIRST, LAST
 from host.diagnosis.explanation import Explanation, Names
@@ -31,6 +31,7 @@ SCANS_OF_A_MOMENT = (24, 96)  # times, the second between the neighbours of the 
 NEAR_A_MOMENT, NEARBY = 0.06, (40, 9)  # of the recording to either side; places there, and beside the best
 CLEARLY = 4.0  # of a deviance: more than rounding
 FEW = 1  # members of a set, the free trim among them, that lacks the most
+LIKELY = {"restoring_share": 1.0, "kinematics_share": 1.0, "pendulum_share": 1.0}  # sin, cos; a pendulum
 SLUGGISH, USUAL_PITCH_DAMPING = -0.3, -3.0  # 1/s, of a2: a base that lacks a slow plane is a slow hull
 
 
@@ -72,6 +73,17 @@ def idle(start: Point, name: str) -> Point:
     """A start at which the effect does not act yet, as near as its bounds allow."""
     values = np.where(np.isin(start.structure.names, named(name).size_names), 0.0, start.parameters)
     return replace(start, parameters=start.structure.clipped(values))
+
+
+def idle_values(fitter: "Fitter", names: Names, known: dict[str, float]) -> Array:
+    """Values of a set's parameters: the known ones; else sizes of none, or usual ones, and probes."""
+    structure, values = structure_of(names), dict(known)
+    for effect in structure.effects:
+        for parameter, probe in zip(effect.parameters, effect.probes[0], strict=True):
+            is_size = parameter.name in effect.size_names
+            values.setdefault(parameter.name, LIKELY.get(parameter.name, 0.0 if is_size else probe))
+    values |= {name: value for name, value in fitter.held.items() if name in values}
+    return structure.clipped(np.array([values[name] for name in structure.names]))
 
 
 def scanned(fitter: "Fitter", start: Point) -> Point:

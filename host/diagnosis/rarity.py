@@ -1,0 +1,69 @@
+"""What seldom acts gives way to what every vehicle has, where the recording cannot tell them apart.
+
+A vehicle on which two of the effects show that every real one has, has all of them, strong or weak. One that
+seldom acts may look likelier there only because it does the work of several of these at once, each too weak
+to pay for itself: a slow attitude filter that of a servo and a little coupling. So each such member is left
+out, all that every vehicle has joins, and what of it does not pay is dropped; the set without the rare member
+is preferred until the one with it is 50 times as likely.
+"""
+
+from typing import TYPE_CHECKING
+
+from host.catalogue import BY_NAME, ORDINARY, named, structure_of
+from host.catalogue.kin import measure_alike
+from host.diagnosis.explanation import Explanation, Names
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.margins import TWIN_MARGIN
+from host.diagnosis.pruning import pruned
+from host.diagnosis.starts import idle_values
+from host.gauss_newton import Point
+
+if TYPE_CHECKING:
+    from host.diagnosis.search import Search
+
+REAL = 2  # effects that every vehicle has, shown by one that is no textbook's
+
+
+def told_by_the_usual(search: "Search", best: Explanation) -> Explanation:
+    """The set, or one with a rare member less that is not clearly less likely."""
+    if len(best.names & {*ORDINARY}) < REAL or search.root.fit.has_process_noise:
+        return best
+    rare = sorted(name for name in best.names & BY_NAME.keys() if not _is_usual(name))
+    if not rare:
+        return best
+    search.on_progress("what every vehicle has in place of " + " and ".join(rare))
+    for name in rare:
+        (whole,) = search.workers.results([(with_all_ordinary, (search.without(best, name),))])
+        # More coefficients can only be likelier: where they are not by far, the rare member is needed.
+        if 2.0 * (best.fit.log_likelihood - whole.fit.log_likelihood) > TWIN_MARGIN:
+            continue
+        lean = pruned(search, search.remember(whole))
+        if lean.bic < best.bic + TWIN_MARGIN:
+            best = lean
+            _tell_twins(search, best, name)
+    return best
+
+
+def with_all_ordinary(fitter: Fitter, parent: Explanation) -> Explanation:
+    """The set with all that every vehicle has, from where that hardly acts yet."""
+    names = parent.names | {*ORDINARY}
+    return fitter.explained(names, fitter.carried_on(_begun(fitter, parent, names)))
+
+
+def _begun(fitter: Fitter, parent: Explanation, names: Names) -> Point:
+    fit = parent.fit
+    known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
+    return Point(structure_of(names), idle_values(fitter, names, known), fit.initial, fit.levels)
+
+
+def _is_usual(name: str) -> bool:
+    effect = named(name)
+    return effect.is_common or name in ORDINARY or bool(effect.changes)
+
+
+def _tell_twins(search: "Search", best: Explanation, rare: str) -> None:
+    """Fits the rare effect in the place of what measures alike, so that it is told as a twin."""
+    kin = [name for name in best.names & BY_NAME.keys() if measure_alike(named(name), named(rare))]
+    fewer = search.each_without(best, kin)
+    tasks = [(Fitter.grown, (smaller, rare, search.values(rare), best)) for smaller in fewer]
+    search.polish([search.remember(found).names for found in search.workers.results(tasks)])

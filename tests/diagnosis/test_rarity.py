@@ -1,0 +1,72 @@
+"""What seldom acts is named on a real hull only where what every vehicle has cannot do its work."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hidden_dive import BASE, hidden_dive
+
+from host.diagnosis.exchange import twins
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.rarity import told_by_the_usual
+from host.diagnosis.search import Search
+from host.diagnosis.workers import Workers
+from host.recording import Array, Recording
+
+SERVO, FILTER = 0.06, 0.5  # s
+
+
+def real_hull(rows: Recording, servo: float, duration: float) -> Recording:
+    """Coupling, drag across the hull and in pitch, and a servo with a lag."""
+    begins, delta = np.empty(rows.time.size), 0.0
+    for k, command in enumerate(rows.rudder):
+        begins[k] = delta
+        delta = command + (delta - command) * np.exp(-rows.step / servo)
+
+    def force(time: float, x: Array, plane: float) -> tuple[float, float, float]:
+        w, q, *_ = x
+        k = min(int(time / rows.step), rows.time.size - 1)
+        off = (begins[k] - rows.rudder[k]) * np.exp(-(time - rows.time[k]) / servo)
+        off += rows.rudder[k] - plane
+        return 0.9 * q - 2.0 * w * abs(w) + BASE["b1"] * off, -4.0 * q * abs(q) + BASE["b2"] * off, 0.0
+
+    return hidden_dive(force, duration=duration)
+
+
+def searched(recording: Recording, *names: str) -> tuple[Search, Explanation]:
+    fitter = Fitter([recording])
+    search = Search(fitter, Workers(fitter, 1), lambda _: None, fitter.base, fitter.root)
+    best = fitter.base
+    for name in names:
+        best = fitter.grown(best, name, [])
+    return search, search.remember(fitter.polished(best))
+
+
+REAL = ("heave_pitch_rate_coupling", "pitch_quadratic_damping")
+
+
+def test_a_slow_attitude_filter_gives_way_to_a_servo_on_a_real_hull() -> None:
+    recording = real_hull(hidden_dive(duration=30.0), SERVO, 30.0)
+    search, best = searched(recording, *REAL, "pitch_sensor_lag")
+    found = told_by_the_usual(search, best)
+    assert "pitch_sensor_lag" not in found.names
+    assert {*REAL, "actuator_lag"} <= found.names
+    assert "pitch_sensor_lag" in twins(search, found, "actuator_lag")
+
+
+def test_a_rare_effect_stays_whose_work_nothing_usual_does() -> None:
+    recording = real_hull(hidden_dive(duration=60.0), SERVO, 60.0)
+    pitch = recording.pitch.copy()
+    for k in range(1, pitch.size):
+        pitch[k] = pitch[k - 1] + (recording.pitch[k] - pitch[k - 1]) * (1 - np.exp(-recording.step / FILTER))
+    noise = np.deg2rad(0.1) * np.random.default_rng(1).standard_normal(pitch.size)
+    slow = replace(recording, pitch=pitch + noise)
+    search, best = searched(slow, *REAL, "pitch_sensor_lag")
+    assert told_by_the_usual(search, best).names >= {"pitch_sensor_lag"}
+
+
+@pytest.mark.parametrize("usual", [(), REAL[:1]])
+def test_a_textbook_s_vehicle_may_have_one_rare_effect_alone(usual: tuple[str, ...]) -> None:
+    search, best = searched(hidden_dive(duration=30.0), *usual, "pitch_sensor_lag")
+    assert told_by_the_usual(search, best) is best
