@@ -38,3 +38,8 @@ def test_nonsense_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert capsys.readouterr().err.startswith("mils: --count")
     assert main(["blind-trial", "--out", str(tmp_path), "--count", "3", "--first", "4"]) == 2
     assert capsys.readouterr().err == "mils: --first must be 1 to 3, the --count\n"
+    assert main(["blind-trial", "--out", str(tmp_path), "--usual", "--published"]) == 2
+    assert (
+        capsys.readouterr().err == "mils: --usual and --published are two kinds of trial: give one of them\n"
+    )
+    assert not [*tmp_path.iterdir()]

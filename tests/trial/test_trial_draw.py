@@ -101,7 +101,7 @@ def test_a_replayed_run_is_the_same_run() -> None:
 
 @pytest.mark.long
 def test_what_is_hidden_can_be_seen_beside_all_that_real_vehicles_have() -> None:
-    drawn = draw(31, 8, Card("one", ("net_buoyancy",)), has_usual=True).answer
+    drawn = draw(31, 8, Card("one", ("net_buoyancy",)), "usual").answer
     assert drawn.usual == [*SHARES]
     assert drawn.misfits["net_buoyancy"] >= MISFIT
     assert drawn.coefficients["large_angle_restoring"] == {"restoring_share": pytest.approx(1.0)}

@@ -10,7 +10,7 @@ from tools.trial.coefficients import true_coefficients
 from tools.trial.hidden import KINDS, STRANGERS, Setting, draw_hidden
 from tools.trial.linear import MORE, free_run
 from tools.trial.outing import draw_outing, with_amplitude
-from tools.trial.refit import remaining
+from tools.trial.refit import foretold, remaining
 from tools.trial.vehicle import draw_vehicle
 from tools.trial.voyage import sail
 
@@ -95,3 +95,28 @@ def test_the_lift_that_a_stalled_plane_keeps_is_claimed_where_it_is_reached() ->
     assert deep["stall_loss"] == slight["stall_loss"] == 1.5
     assert deep["stall_share"] == 0.5
     assert "stall_share" not in slight
+
+
+def test_what_is_foretold_of_a_linear_model_is_what_remains() -> None:
+    rng = np.random.default_rng(3)
+    slopes, offset = rng.standard_normal((4, 40)), rng.standard_normal(40)
+
+    def model(sets: np.ndarray) -> np.ndarray:
+        return offset + sets @ slopes
+
+    start, steps = np.zeros(4), np.full(4, 1e-4)
+    assert foretold(model, start, steps) == pytest.approx(remaining(model, start, steps), rel=1e-6)
+    assert foretold(model, start, steps, least=1e6) == pytest.approx(float(offset @ offset))
+
+
+def test_coefficients_that_do_the_same_or_nothing_are_no_trouble() -> None:
+    def model(sets: np.ndarray) -> np.ndarray:
+        a, b, _ = sets.T
+        return np.stack([1.0 + a + b, 2.0 + a + b, 0.0 * a + 5.0], axis=1)
+
+    left = foretold(model, np.zeros(3), np.full(3, 1e-4))
+    assert left == pytest.approx(25.5, rel=1e-4)
+
+
+def test_nothing_is_foretold_beside_a_run_that_fails() -> None:
+    assert foretold(lambda sets: np.full((len(sets), 4), np.inf), np.zeros(2), np.ones(2)) == np.inf

@@ -102,10 +102,11 @@ def test_tables_page_and_file_say_the_same(tmp_path: Path) -> None:
     assert content["seed"] == 7
     assert len(content["judged"]) == 6
     assert content["rates"][0]["hits"] == 1
-    write_page(tmp_path / "trial.html", 7, "abc", result, judged, ["heave_quadratic_drag"])
+    write_page(tmp_path / "trial.html", 7, "abc", result, judged, ["heave_quadratic_drag"], ["LAUV"])
     page = (tmp_path / "trial.html").read_text()
     assert "trim_moment named net_buoyancy: 1" in page
     assert "real ones have (heave_quadratic_drag)" in page
+    assert "like a published one (LAUV)" in page
     assert "http" not in page.replace("http-equiv", "")
 
 

@@ -26,6 +26,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--usual", action="store_true", help="every vehicle also has what real ones have: drag, a lag, ..."
     )
+    parser.add_argument(
+        "--published",
+        action="store_true",
+        help="every vehicle is like one that was published, with the whole of its physics; not with --usual",
+    )
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes at once (default 2)")
     parser.add_argument("--quiet", action="store_true", help="no progress")
 
@@ -37,6 +42,7 @@ def run(args: argparse.Namespace) -> int:
 
     from tools.paper.stages import stages
     from tools.trial.answers import SEALED, BrokenSeal, open_answers, published
+    from tools.trial.fleet import Fleet
     from tools.trial.judge import judge, names_just
     from tools.trial.page import print_score, write_json, write_page
     from tools.trial.recorded import read_recorded
@@ -51,13 +57,17 @@ def run(args: argparse.Namespace) -> int:
     if not 1 <= args.first <= args.count:
         print(f"mils: --first must be 1 to {args.count}, the --count", file=sys.stderr)
         return 2
+    if args.usual and args.published:
+        print("mils: --usual and --published are two kinds of trial: give one of them", file=sys.stderr)
+        return 2
+    fleet: Fleet = "published" if args.published else "usual" if args.usual else "linear"
     chosen = slice(args.first - 1, args.count)
     with stages(args.quiet) as stage:
         digest = published(folder)
         if digest is None:
             seed = int.from_bytes(os.urandom(6)) if args.seed is None else args.seed
             with stage("drawing vehicles", args.count) as step:
-                digest = write_trial(folder, seed, args.count, args.jobs, step, args.usual)
+                digest = write_trial(folder, seed, args.count, args.jobs, step, fleet)
         print(f"answers sealed: SHA-256 {digest}  {folder / SEALED}", flush=True)
         paths = recordings(folder)[chosen]
         if not paths:
@@ -104,6 +114,7 @@ def run(args: argparse.Namespace) -> int:
     print_score(result, Console(width=None if sys.stdout.isatty() else 110))
     write_json(folder / "trial.json", seed, digest, result, judged)
     usual = sorted({name for answer in answers for name in answer.usual})
-    write_page(folder / "trial.html", seed, digest, result, judged, usual)
+    vehicles = sorted({str(answer.outing["vehicle"]) for answer in answers if "vehicle" in answer.outing})
+    write_page(folder / "trial.html", seed, digest, result, judged, usual, vehicles)
     print(f"report: {folder / 'trial.html'}\nfigures: {folder / 'trial.json'}")
     return 1 if any(rate.is_met is False for rate in result.rates) else 0

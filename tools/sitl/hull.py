@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from math import cos, sin
+from typing import Protocol
 
 from tools.sitl.effects import Effects
 from tools.sitl.strict import require
@@ -50,9 +51,27 @@ class Hull:
         """N"""
         return self.mass * GRAVITY
 
+    def body(self, effects: Effects, speed: float, start_depth: float) -> "Hydrodynamics":
+        """The equations of motion of this hull, whose thrust balances its drag at `speed`."""
+        return Hydrodynamics(self, effects, speed, start_depth)
+
 
 Motion = tuple[float, float, float, float, float]
 """u, w, q (surge, heave, pitch rate through the water; body axes, z down), theta (nose up), depth (down)."""
+
+
+class Body(Protocol):
+    """Equations of motion."""
+
+    def rates(
+        self, motion: Motion, plane: float, t_s: float, water: float, water_pitch_rate: float
+    ) -> Motion:
+        """Time derivatives of the motion.
+
+        plane             rad, deflection that makes force
+        water             m/s, vertical velocity of the water, down
+        water_pitch_rate  rad/s, nose-up turning of the water's motion along the hull
+        """
 
 
 class Hydrodynamics:
@@ -101,12 +120,7 @@ class Hydrodynamics:
     def rates(
         self, motion: Motion, plane: float, t_s: float, water: float, water_pitch_rate: float
     ) -> Motion:
-        """Time derivatives of the motion.
-
-        plane             rad, deflection that makes force
-        water             m/s, vertical velocity of the water, down
-        water_pitch_rate  rad/s, nose-up turning of the water's motion along the hull
-        """
+        """Time derivatives of the motion, as of every body."""
         u, w, q, theta, depth = motion
         hull = self.hull
         sine, cosine = sin(theta), cos(theta)

@@ -10,7 +10,7 @@ import numpy as np
 from tools.sitl.actuator import Actuator
 from tools.sitl.errors import ScenarioError
 from tools.sitl.excitation import Commander, make_law
-from tools.sitl.hull import Hydrodynamics, Motion
+from tools.sitl.hull import Body, Motion
 from tools.sitl.scenario import Scenario
 from tools.sitl.sea import Sea
 from tools.sitl.sensors import DepthAndPitchSensing
@@ -53,7 +53,8 @@ class Plant:
         self.steps = 0
         start = scenario.start
         self.motion: Motion = (start.speed, start.heave, start.pitch_rate, start.pitch, start.depth)
-        self.hydrodynamics = Hydrodynamics(scenario.hull, scenario.effects, start.speed, start.depth)
+        self.hydrodynamics = scenario.hull.body(scenario.effects, start.speed, start.depth)
+        self.body: Body = self.hydrodynamics  # around which other physics may be put
         self.sea = Sea(scenario.effects, start.speed, stream(seed, "sea"))
         self.actuator = Actuator(scenario.effects, scenario.step_s)
         self.sensing = DepthAndPitchSensing(scenario.effects, scenario.step_s)
@@ -75,7 +76,7 @@ class Plant:
         begin = lift(first, t_s)
         mid = begin if middle == first else lift(middle, t_s)
         end = begin if last == first else lift(last, t_s)
-        rates = self.hydrodynamics.rates
+        rates = self.body.rates
         x = self.motion
         k1 = rates(x, begin, t_s, velocity, turning)
         k2 = rates(_along(x, k1, half), mid, t_s, velocity, turning)

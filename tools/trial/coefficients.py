@@ -59,6 +59,16 @@ def lifted(base: dict[str, float], net_buoyancy: float, mass_kg: float) -> dict[
     return base | {"a3": base["a3"] * (1.0 + net_buoyancy / (mass_kg * GRAVITY))}
 
 
+def free_of_mass(effect: str, coefficients: dict[str, float]) -> dict[str, float]:
+    """Those that hold for any hull: where heaving and turning share their masses, forces per mass do not.
+
+    Nor does how far ahead a depth gauge sits, as any point of such a hull may be the one that is modelled.
+    """
+    if effect == "depth_sensor_lever_arm":
+        return {}
+    return {name: value for name, value in coefficients.items() if not name.startswith("c_")}
+
+
 _SAME_UNIT = {
     "large_angle_restoring": "restoring_share",
     "large_angle_kinematics": "kinematics_share",

@@ -6,7 +6,8 @@ from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 
-from tools.trial.hidden import KINDS, STRANGERS
+from tools.trial.fleet import Fleet, hideable
+from tools.trial.hidden import STRANGERS
 
 Case = Literal["none", "one", "two", "outside"]
 PACK: tuple[Case, ...] = ("none",) * 4 + ("one",) * 8 + ("two",) * 5 + ("outside",) * 3
@@ -22,12 +23,12 @@ class Card(NamedTuple):
     names: tuple[str, ...]
 
 
-def deal(seed: int, count: int) -> list[Card]:
+def deal(seed: int, count: int, fleet: Fleet = "linear") -> list[Card]:
     """The first `count` cards of a seed; more cards begin with the same ones."""
     rng = np.random.default_rng([seed, 0])
     cases = _shuffled(rng, PACK)
-    one = _shuffled(np.random.default_rng([seed, 1]), tuple(KINDS))
-    two = _shuffled(np.random.default_rng([seed, 2]), tuple(KINDS))
+    one = _shuffled(np.random.default_rng([seed, 1]), hideable(fleet))
+    two = _shuffled(np.random.default_rng([seed, 2]), hideable(fleet))
     outside = _shuffled(np.random.default_rng([seed, 3]), tuple(STRANGERS))
     cards = []
     for case in islice(cases, count):

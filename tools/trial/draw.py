@@ -9,10 +9,12 @@ from tools.sitl.errors import ScenarioError
 from tools.sitl.plant import Plant
 from tools.sitl.recording import Table, measure
 from tools.trial.answers import Answer, Floor
-from tools.trial.coefficients import true_coefficients
+from tools.trial.coefficients import free_of_mass, true_coefficients
 from tools.trial.deck import Card
-from tools.trial.hidden import KINDS, STRANGERS, Hidden, Setting, draw_hidden, switched, with_strength
-from tools.trial.outing import Outing, draw_outing, with_amplitude
+from tools.trial.fleet import Fleet, hideable
+from tools.trial.hidden import STRANGERS, Hidden, Setting, draw_hidden, switched, with_strength
+from tools.trial.outing import LONGEST_STEP, Outing, draw_outing, with_amplitude
+from tools.trial.published import NATIVE, SLOW_STEP, draw_published, draw_servo, draw_steady
 from tools.trial.usual import draw_usual
 from tools.trial.vehicle import draw_vehicle, log_uniform
 from tools.trial.visibility import Yardstick, is_ordinary, linear_misfit, misfit_beside, yardstick
@@ -41,18 +43,18 @@ class Drawn:
     answer: Answer
 
 
-def draw(seed: int, number: int, card: Card, has_usual: bool = False) -> Drawn:
+def draw(seed: int, number: int, card: Card, fleet: Fleet = "linear") -> Drawn:
     """Recording `number` of a trial: vehicles and outings are drawn until all on the card can be seen.
 
-    has_usual    the vehicle also has all that real ones have, and what is on the card is seen beside it
+    It is seen beside what the vehicles of the fleet have by themselves.
     """
     for attempt in range(MOST_ATTEMPTS):
         rng = np.random.default_rng([seed, 4, number, attempt])
         if card.names and attempt > 0 and attempt % PATIENCE == 0:
-            family = tuple(STRANGERS if card.case == "outside" else KINDS)
+            family = tuple(STRANGERS) if card.case == "outside" else hideable(fleet)
             names = rng.choice(family, len(card.names), replace=False).tolist()
             card = Card(card.case, tuple(names))
-        drawn = _attempt(rng, number, card, has_usual)
+        drawn = _attempt(rng, number, card, fleet)
         if drawn is not None:
             return drawn
     raise CannotDraw(
@@ -60,16 +62,18 @@ def draw(seed: int, number: int, card: Card, has_usual: bool = False) -> Drawn:
     )
 
 
-def _attempt(rng: np.random.Generator, number: int, card: Card, has_usual: bool) -> Drawn | None:
-    vehicle = draw_vehicle(rng)
-    outing = draw_outing(rng, vehicle, near_surface="surface_waves" in card.names)
+def _attempt(rng: np.random.Generator, number: int, card: Card, fleet: Fleet) -> Drawn | None:
+    name, vehicle = draw_published(rng) if fleet == "published" else ("", draw_vehicle(rng))
+    longest = SLOW_STEP if fleet == "published" else LONGEST_STEP
+    outing = draw_outing(rng, vehicle, "surface_waves" in card.names, longest)
     seed = int(rng.integers(2**31))
     scenario = outing.scenario
     setting = Setting(
         vehicle=vehicle, command=0.1, pitch=0.1, duration_s=scenario.duration_s, step_s=scenario.step_s
     )
+    native = (draw_servo(rng, setting),) if fleet == "published" else ()
     try:
-        outing, plain = _sized_to_pitch(rng, outing, seed, setting)
+        outing, plain = _sized_to_pitch(rng, outing, seed, setting, native)
     except ScenarioError:
         return None
     setting = replace(
@@ -79,12 +83,12 @@ def _attempt(rng: np.random.Generator, number: int, card: Card, has_usual: bool)
     if not is_ordinary(plain) or setting.command < 0.01:
         return None
     hidden: tuple[Hidden, ...] = ()
-    for name in card.names:
-        effect = _strong_enough(rng, draw_hidden(rng, name, setting), outing, seed, setting, noise)
+    for kind in card.names:
+        effect = _strong_enough(rng, draw_hidden(rng, kind, setting), outing, seed, setting, noise, native)
         if effect is None:
             return None
         hidden = (*hidden, effect)
-    usual = draw_usual(rng, setting, card.names) if has_usual else ()
+    usual = draw_usual(rng, setting, card.names) if fleet == "usual" else native
     acting = (*hidden, *usual)
     try:
         voyage = sail(outing.scenario, seed, acting, setting)
@@ -92,52 +96,64 @@ def _attempt(rng: np.random.Generator, number: int, card: Card, has_usual: bool)
         return None
     if not is_ordinary(voyage):
         return None
-    if len(acting) == 1:
+    if len(hidden) == 1 and not usual:
         beyond = hidden[0].is_foreign
         misfits = {hidden[0].name: linear_misfit(voyage, outing, setting, noise, beyond)}
     else:
-        misfits = _misfits_beside(voyage, outing, seed, hidden, usual, setting, noise)
+        steady = draw_steady(rng, setting) if fleet == "published" else ()
+        misfits = _misfits_beside(voyage, outing, seed, hidden, usual, steady, setting, noise)
     if len(misfits) < len(hidden):
         return None
-    return _written(number, card, outing, seed, setting, noise, hidden, usual, voyage, misfits)
+    drawn = _written(number, card, outing, seed, setting, noise, hidden, usual, voyage, misfits)
+    return _of_published(drawn, name) if fleet == "published" else drawn
 
 
 def _sized_to_pitch(
-    rng: np.random.Generator, outing: Outing, seed: int, setting: Setting
+    rng: np.random.Generator, outing: Outing, seed: int, setting: Setting, native: tuple[Hidden, ...]
 ) -> tuple[Outing, Voyage]:
     """The plane's amplitude set for a drawn largest pitch, and the run with nothing hidden."""
     if outing.scenario.excitation.program == "depth_steps":
         outing = with_amplitude(outing, rng.uniform(0.2, 0.4))
-        return outing, sail(outing.scenario, seed, (), setting)
+        return outing, sail(outing.scenario, seed, native, setting)
     largest = log_uniform(rng, 0.08, 0.5)
-    first = sail(outing.scenario, seed, (), setting)
+    first = sail(outing.scenario, seed, native, setting)
     factor = min(
         largest / float(np.abs(first.pitch).max()), MOST_COMMAND / float(np.abs(first.command).max())
     )
     outing = with_amplitude(outing, max(0.1 * factor, 0.02))
-    voyage = sail(outing.scenario, seed, (), setting)
+    voyage = sail(outing.scenario, seed, native, setting)
     shallowest = float(voyage.table["depth_m"].min())
     if shallowest < 5.0:
         start = replace(outing.scenario.start, depth=outing.scenario.start.depth + 10.0 - shallowest)
         outing = replace(outing, scenario=replace(outing.scenario, start=start))
-        voyage = sail(outing.scenario, seed, (), setting)
+        voyage = sail(outing.scenario, seed, native, setting)
     return outing, voyage
 
 
 def _strong_enough(
-    rng: np.random.Generator, effect: Hidden, outing: Outing, seed: int, setting: Setting, noise: Yardstick
+    rng: np.random.Generator,
+    effect: Hidden,
+    outing: Outing,
+    seed: int,
+    setting: Setting,
+    noise: Yardstick,
+    native: tuple[Hidden, ...],
 ) -> Hidden | None:
     """At a drawn strength; None where it cannot be seen, or tears the vehicle out of the water."""
     effect = with_strength(effect, log_uniform(rng, *STRENGTHS))
     if not effect.deserves_its_name(setting):
         return None
     try:
-        voyage = sail(outing.scenario, seed, (effect,), setting)
+        voyage = sail(outing.scenario, seed, (effect, *native), setting)
+        without = sail(outing.scenario, seed, native, setting, voyage.command) if native else None
     except ScenarioError:
         return None
     if not is_ordinary(voyage):
         return None
-    misfit = linear_misfit(voyage, outing, setting, noise, effect.is_foreign)
+    if without is None:
+        misfit = linear_misfit(voyage, outing, setting, noise, effect.is_foreign)
+    else:  # linear equations do not follow such a vehicle anyway; what its own can follow is asked later
+        misfit = float(np.sum(noise.residual(without.pitch, without.depth, voyage) ** 2))
     return effect if misfit >= (FOREIGN_MISFIT if effect.is_foreign else MISFIT) else None
 
 
@@ -147,10 +163,14 @@ def _misfits_beside(
     seed: int,
     hidden: tuple[Hidden, ...],
     usual: tuple[Hidden, ...],
+    steady: tuple[Hidden, ...],
     setting: Setting,
     noise: Yardstick,
 ) -> dict[str, float]:
-    """What each hidden effect leaves beside all else that acts, up to the first that cannot be seen."""
+    """What each hidden effect leaves beside all else that acts, up to the first that cannot be seen.
+
+    steady    forces that must not explain what is foreign
+    """
     acting = (*hidden, *usual)
     calm = tuple(effect for effect in acting if effect.name != "surface_waves")
     among_waves = noise
@@ -161,8 +181,10 @@ def _misfits_beside(
     for effect in hidden:
         others = tuple(other for other in acting if other is not effect)
         told_from = among_waves if effect in calm else noise
-        misfit = misfit_beside(voyage, outing, seed, others, setting, told_from, MISFIT)
-        if misfit < MISFIT:
+        unneeded = steady if effect.is_foreign else ()
+        least = FOREIGN_MISFIT if unneeded else MISFIT
+        misfit = misfit_beside(voyage, outing, seed, others, setting, told_from, least, unneeded)
+        if misfit < least:
             break
         misfits[effect.name] = misfit
     return misfits
@@ -223,3 +245,16 @@ def _written(
         ),
     )
     return Drawn(table=table, answer=answer)
+
+
+def _of_published(drawn: Drawn, vehicle: str) -> Drawn:
+    """With all that the vehicle has by itself; without coefficients that depend on how masses are shared."""
+    answer = drawn.answer
+    answer = replace(
+        answer,
+        usual=list(NATIVE),
+        base={},
+        coefficients={name: free_of_mass(name, found) for name, found in answer.coefficients.items()},
+        outing={"vehicle": vehicle, **answer.outing},
+    )
+    return replace(drawn, answer=answer)

@@ -13,6 +13,7 @@ from tools.trial.vehicle import Vehicle, log_uniform
 RATES_HZ = (5.0, 8.0, 10.0, 10.0, 12.5, 20.0)
 PROGRAMS = ("multistep", "multistep", "3211", "multisine", "doublets", "depth_steps")
 LONGEST_STEP = 0.02  # s, of the integrator
+LEAST_STEPPED = 0.08  # s: a shorter interval between commands has as many steps as this
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +29,9 @@ class Outing:
         return self.scenario.sensors.depth.rate_hz
 
 
-def draw_outing(rng: np.random.Generator, vehicle: Vehicle, near_surface: bool) -> Outing:
+def draw_outing(
+    rng: np.random.Generator, vehicle: Vehicle, near_surface: bool, longest_step: float = LONGEST_STEP
+) -> Outing:
     """60-600 s, 5-20 Hz; the plane's amplitude is still that of a first try, see `with_amplitude`.
 
     The command changes only where it is recorded, so that a recording with nothing hidden obeys the paper's
@@ -44,7 +47,7 @@ def draw_outing(rng: np.random.Generator, vehicle: Vehicle, near_surface: bool) 
         pitch_rate=rng.normal(0.0, 0.01),
         speed=vehicle.speed,
     )
-    substeps = max(4, round(1.0 / rate / LONGEST_STEP))
+    substeps = round(max(1.0 / rate, LEAST_STEPPED) / longest_step)
     scenario = Scenario(
         name="blind trial",
         duration_s=round(log_uniform(rng, 60.0, 600.0) * rate) / rate,

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from math import cos, pi, sin, tanh
 
-from tools.sitl.effects import Effects
-from tools.sitl.hull import Hull, Hydrodynamics, Motion
+from tools.sitl.hull import Body, Motion
 
 
 class Foreign:
@@ -95,19 +94,17 @@ class OneWayDrag(Foreign):
         return (-self.size * w * w if w > 0.0 else 0.0), 0.0
 
 
-class ForcedBody(Hydrodynamics):
-    """The plant's body with something foreign at work on it."""
+@dataclass(frozen=True, slots=True)
+class ForcedBody:
+    """A body with something foreign at work on it."""
 
-    def __init__(
-        self, hull: Hull, effects: Effects, speed: float, start_depth: float, foreign: Foreign
-    ) -> None:
-        super().__init__(hull, effects, speed, start_depth)
-        self.foreign = foreign
+    body: Body
+    foreign: Foreign
 
     def rates(
         self, motion: Motion, plane: float, t_s: float, water: float, water_pitch_rate: float
     ) -> Motion:
         acting = self.foreign.bend(plane, motion, t_s)
-        du, dw, dq, turn, climb = super().rates(motion, acting, t_s, water, water_pitch_rate)
+        du, dw, dq, turn, climb = self.body.rates(motion, acting, t_s, water, water_pitch_rate)
         heave, pitch = self.foreign.push(motion, t_s)
         return du, dw + heave, dq + pitch, turn, climb

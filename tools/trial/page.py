@@ -71,9 +71,19 @@ def write_json(path: Path, seed: int, digest: str, result: Score, judged: list[J
 
 
 def write_page(
-    path: Path, seed: int, digest: str, result: Score, judged: list[Judged], usual: list[str]
+    path: Path,
+    seed: int,
+    digest: str,
+    result: Score,
+    judged: list[Judged],
+    usual: list[str],
+    vehicles: list[str],
 ) -> None:
-    """trial.html. `usual` is what every vehicle has beside what is hidden."""
+    """trial.html.
+
+    usual      what every vehicle has beside what is hidden
+    vehicles   the published ones that they are like; none in other trials
+    """
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent), autoescape=select_autoescape(default=True)
     )
@@ -92,6 +102,7 @@ def write_page(
         matrix=matrix,
         strangers=tuple(STRANGERS),
         usual=usual,
+        vehicles=vehicles,
         bar=bar,
         percent=_percent,
         wrong=sorted(wrong, key=lambda j: -j.weakest_misfit),

@@ -63,6 +63,27 @@ def remaining(
     return cost
 
 
+def foretold(model: Model, start: Array, steps: Array, least: float = 0.0) -> float:
+    """The same as one step foretells it, were the model linear: for many coefficients and long runs.
+
+    Of slopes that point the same way each is free, which no fit of nonlinear equations is, so hardly less is
+    left in truth. Below `least` without any step, that is all.
+    """
+    residual = model(start[None, :])[0]
+    cost = float(residual @ residual)
+    if not np.isfinite(cost):
+        return np.inf
+    if cost < least:
+        return cost
+    slopes = _slopes(model, start, residual, steps)
+    if not np.isfinite(slopes).all():
+        return np.inf  # beside a run that fails there is nowhere to go
+    scaled = slopes / (np.sqrt(np.sum(slopes**2, axis=1)) + 1e-12)[:, None]
+    step, *_ = np.linalg.lstsq(scaled.T, residual, rcond=1e-10)
+    left = residual - scaled.T @ step
+    return float(left @ left)
+
+
 def _slopes(model: Model, at: Array, residual: Array, steps: Array) -> Array:
     """(coefficients, rows)."""
     return (model(at + np.diag(steps)) - residual) / steps[:, None]

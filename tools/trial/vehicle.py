@@ -17,11 +17,17 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Vehicle:
-    """A hull under way; `length` in m, `speed` in m/s."""
+    """A hull under way; `length` in m, `speed` in m/s.
+
+    derivatives   of the hull, that whoever fits such a vehicle to a recording finds anew
+    is_whole      whether they are so many that what a fit of them leaves is foretold, not fitted
+    """
 
     hull: Hull
     speed: float
     length: float
+    derivatives: tuple[str, ...] = ("Zw", "Mq", "zb", "Zdelta", "Mdelta")
+    is_whole: bool = False
 
     @property
     def heave_mass(self) -> float:

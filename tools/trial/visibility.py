@@ -11,7 +11,7 @@ from tools.sitl.scenario import Scenario
 from tools.trial.hidden import Hidden, Setting, with_strength
 from tools.trial.linear import MORE, NAMES, STATE, free_run
 from tools.trial.outing import Outing
-from tools.trial.refit import remaining
+from tools.trial.refit import foretold, remaining
 from tools.trial.voyage import Voyage, sail
 
 Array = npt.NDArray[np.float64]
@@ -125,6 +125,7 @@ def misfit_beside(
     setting: Setting,
     noise: Yardstick,
     least: float,
+    unneeded: tuple[Hidden, ...] = (),
 ) -> float:
     """What a vehicle of the same kind with only `others` hidden cannot follow, with its best coefficients.
 
@@ -132,12 +133,16 @@ def misfit_beside(
 
     The coefficients are shares of the hull's derivatives, the speed where it is not measured, the start, and
     the strength of the others.
+
+    unneeded    effects that do not act, but might explain those that do
     """
     hull, start = outing.scenario.hull, outing.scenario.start
-    derivatives = ("Zw", "Mq", "zb", "Zdelta", "Mdelta")
+    derivatives = setting.vehicle.derivatives
     speeds = () if outing.has_speed else ("speed",)
     first = np.array(
-        [1.0] * (len(derivatives) + len(speeds) + len(others)) + [getattr(start, name) for name in STATE]
+        [1.0] * (len(derivatives) + len(speeds) + len(others))
+        + [0.0] * len(unneeded)
+        + [getattr(start, name) for name in STATE]
     )
     steps = np.full(len(first), 1e-3)
 
@@ -145,7 +150,7 @@ def misfit_beside(
         shares = iter(values.tolist())
         changed_hull = replace(hull, **{name: getattr(hull, name) * next(shares) for name in derivatives})
         changed = {name: getattr(start, name) * next(shares) for name in speeds}
-        scaled = tuple(with_strength(other, other.strength * next(shares)) for other in others)
+        scaled = tuple(with_strength(other, other.strength * next(shares)) for other in (*others, *unneeded))
         changed |= {name: next(shares) for name in STATE}
         scenario = replace(outing.scenario, hull=changed_hull, start=replace(start, **changed))
         other_run = sail(scenario, seed, scaled, setting, voyage.command)
@@ -162,4 +167,6 @@ def misfit_beside(
                 rows.append(np.full(lost, np.inf))
         return np.array(rows)
 
+    if setting.vehicle.is_whole:
+        return foretold(model, first, steps, least)
     return remaining(model, first, steps, least=least, is_dear=True)

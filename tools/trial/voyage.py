@@ -53,10 +53,7 @@ def sail(
     for effect in hidden:
         foreign = effect.foreign(setting)
         if foreign is not None:
-            start = scenario.start
-            plant.hydrodynamics = ForcedBody(
-                scenario.hull, scenario.effects, start.speed, start.depth, foreign
-            )
+            plant.body = ForcedBody(plant.body, foreign)
     if commands is not None:
         plant.commander = Replayed(scenario, commands)
     rows = [plant.now, *(plant.step() for _ in range(round(scenario.duration_s / scenario.step_s)))]

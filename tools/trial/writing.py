@@ -10,12 +10,13 @@ from tools.sitl.recording import write_csv
 from tools.trial.answers import Answer, recording_name, seal
 from tools.trial.deck import Card, deal
 from tools.trial.draw import draw
+from tools.trial.fleet import Fleet
 
 RECORDINGS = "recordings"
 
 
 def write_trial(
-    folder: Path, seed: int, count: int, jobs: int, on_drawn: Callable[[], None], has_usual: bool = False
+    folder: Path, seed: int, count: int, jobs: int, on_drawn: Callable[[], None], fleet: Fleet = "linear"
 ) -> str:
     """Writes `count` recordings of a seed and the sealed answers; gives the SHA-256 of the answers."""
     (folder / RECORDINGS).mkdir(parents=True, exist_ok=True)
@@ -25,8 +26,8 @@ def write_trial(
     answers = []
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         drawing = [
-            pool.submit(_write_one, folder, seed, number, card, has_usual)
-            for number, card in enumerate(deal(seed, count), start=1)
+            pool.submit(_write_one, folder, seed, number, card, fleet)
+            for number, card in enumerate(deal(seed, count, fleet), start=1)
         ]
         for drawn in as_completed(drawing):
             answers.append(drawn.result())
@@ -39,7 +40,7 @@ def recordings(folder: Path) -> list[Path]:
     return sorted((folder / RECORDINGS).glob("*.csv"))
 
 
-def _write_one(folder: Path, seed: int, number: int, card: Card, has_usual: bool) -> Answer:
-    drawn = draw(seed, number, card, has_usual)
+def _write_one(folder: Path, seed: int, number: int, card: Card, fleet: Fleet) -> Answer:
+    drawn = draw(seed, number, card, fleet)
     write_csv(folder / RECORDINGS / f"{recording_name(number)}.csv", drawn.table)
     return drawn.answer
