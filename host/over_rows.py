@@ -12,7 +12,8 @@ from host.recording import Array
 
 ROWS_AT_ONCE = 256
 KEPT = 64  # functions of each kind: a search meets hundreds of sets, and those of all would fill the memory
-# Instructions and rows after which a function is compiled: it has run for about as long as that takes.
+# Instructions and rows after which a function is compiled: it has run for about as long as that takes. One
+# that was compiled before is at once.
 FEW_ROWS, FEW_INSTRUCTIONS = 4e4, 8e7
 
 F = TypeVar("F")
@@ -57,8 +58,9 @@ class _CarriedOn:
 
     def __init__(self, step: ca.Function, at_once: int) -> None:
         self._step, self._at_once = step, at_once
-        self._function = step.mapaccum(f"rows_{at_once}", at_once)
-        self._left = FEW_ROWS + FEW_INSTRUCTIONS / step.n_instructions()
+        kept = as_machine_code(step, is_kept=True)
+        self._function = (step if kept is None else kept).mapaccum(f"rows_{at_once}", at_once)
+        self._left = FEW_ROWS + FEW_INSTRUCTIONS / step.n_instructions() if kept is None else 0.0
 
     def for_rows(self, count: int) -> ca.Function:
         """The function over the rows at once, for a recording of so many; compiled once that pays."""

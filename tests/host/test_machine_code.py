@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from exact_dive import TABLE_1, Dive, fly
 
-from host import machine_code, over_rows
+from host import library_shelf, machine_code, over_rows
 from host.catalogue import BY_NAME
 from host.equations import Structure
 from host.kalman import kalman_pass
@@ -37,6 +37,15 @@ def passes() -> list[Array]:
     return found
 
 
+@pytest.fixture(autouse=True)
+def shelf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty one."""
+    found = tmp_path / "shelf"
+    found.mkdir()
+    monkeypatch.setattr(library_shelf, "folder", lambda: found)
+    return found
+
+
 @needs_compiler
 def test_compiled_runs_have_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
     over_rows._carried_on.cache_clear()
@@ -47,9 +56,9 @@ def test_compiled_runs_have_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(over_rows, "FEW_INSTRUCTIONS", 1.0)
     compiled: list[str] = []
 
-    def watched(function: ca.Function) -> ca.Function | None:
-        compiled.append(function.name())
-        return as_machine_code(function)
+    def watched(function: ca.Function, is_kept: bool = False) -> ca.Function | None:
+        compiled.extend([function.name()] * (not is_kept))
+        return as_machine_code(function, is_kept)
 
     monkeypatch.setattr(over_rows, "as_machine_code", watched)
     for _ in range(2):
@@ -95,3 +104,31 @@ def test_a_compiled_function_outlives_its_file() -> None:
     assert compiled is not None
     for found, expected in zip(compiled([1.0, 2.0], 3.0), function([1.0, 2.0], 3.0), strict=True):
         np.testing.assert_array_equal(np.array(found), np.array(expected))
+
+
+@needs_compiler
+def test_what_was_compiled_once_is_not_compiled_again(shelf: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    x = ca.SX.sym("x")
+    function = ca.Function("twice", [x], [2.0 * x])
+    assert as_machine_code(function, is_kept=True) is None
+    assert as_machine_code(function) is not None
+    assert len([*shelf.iterdir()]) == 1
+    monkeypatch.setattr(machine_code, "_made_by", lambda *_: pytest.fail("compiled again"))
+    kept = as_machine_code(function, is_kept=True)
+    assert kept is not None
+    assert float(kept(3.0)) == 6.0
+    assert as_machine_code(ca.Function("twice", [x], [2.5 * x]), is_kept=True) is None
+
+
+@needs_compiler
+def test_a_library_that_is_damaged_is_compiled_anew(shelf: Path) -> None:
+    x = ca.SX.sym("x")
+    function = ca.Function("twice", [x], [2.0 * x])
+    as_machine_code(function)
+    (place,) = shelf.iterdir()
+    place.write_bytes(b"half of it")
+    assert as_machine_code(function, is_kept=True) is None
+    assert not place.exists()
+    found = as_machine_code(function)
+    assert found is not None
+    assert float(found(3.0)) == 6.0
