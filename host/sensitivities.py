@@ -45,11 +45,13 @@ def sensitivities(
     _, start = start_of(form, parameters, initial, inputs)
     with np.errstate(all="ignore"):  # a run that leaves the numbers is seen by its size
         hx, hp = _output_slopes(form)(run.states, parameters, inputs.drive)
-        Fx, Fp = _slopes_of_rows(form, run, parameters, inputs.drive)
-        if gains is not None:
-            FK = Fx @ gains.T.reshape((rows, 2, form.nx)).transpose(0, 2, 1)
-            Fx, Fp = Fx - FK @ hx, Fp - FK @ hp
-        seen = hx @ linear_recursion(Fx, Fp, start)
+        Fx, Fp = _slopes_of_substeps(form, run, parameters, inputs.drive)
+        if gains is not None:  # a measurement corrects the state before the first sub-step
+            first = slice(0, None, form.substeps)
+            FK = Fx[first] @ gains.T.reshape((rows, 2, form.nx)).transpose(0, 2, 1)
+            Fx[first] -= FK @ hx
+            Fp[first] -= FK @ hp
+        seen = hx @ linear_recursion(Fx, Fp, start)[:: form.substeps]
         seen[:, :, : form.np] += hp
         return seen.transpose(1, 2, 0) * inputs.present[:, None, :]
 
@@ -64,15 +66,12 @@ def steered_run(parameters: Array, initial: Array, inputs: Inputs, gains: Array)
     return Run(states=states, outputs=outputs, within=within.reshape((form.substeps, form.nx, -1)))
 
 
-def _slopes_of_rows(form: Form, run: Run, parameters: Array, drive: Array) -> tuple[Array, Array]:
-    """F_x (N, nx, nx) and F_p (N, nx, parameters) from row to row, those of the sub-steps chained."""
+def _slopes_of_substeps(form: Form, run: Run, parameters: Array, drive: Array) -> tuple[Array, Array]:
+    """F_x (N substeps, nx, nx) and F_p (N substeps, nx, parameters) of each sub-step of each row."""
     rows, substeps = drive.shape[1], form.substeps
-    states, number = np.hstack(list(run.within)), np.repeat(np.arange(float(substeps)), rows)[None]
-    slopes = _substep_slopes(form)(states, parameters, np.tile(drive, substeps), number)
-    each = [slope.reshape((substeps, rows, *slope.shape[1:])) for slope in slopes]
-    Fx, Fp = each[0][0], each[1][0]
-    for by_state, by_parameter in zip(each[0][1:], each[1][1:], strict=True):
-        Fx, Fp = by_state @ Fx, by_state @ Fp + by_parameter
+    states = run.within.transpose(1, 2, 0).reshape((form.nx, -1))
+    number = np.tile(np.arange(float(substeps)), rows)[None]
+    Fx, Fp = _substep_slopes(form)(states, parameters, np.repeat(drive, substeps, axis=1), number)
     return Fx, Fp
 
 
