@@ -73,6 +73,25 @@ def whitened_innovations(
     return [whiten(run.error, np.empty((2, 0, run.error.shape[1])), run.variance) for run in passes]
 
 
+def whitened_by(
+    point: Point, inputs: list[Inputs], passes: list[KalmanPass], states: tuple[str, ...]
+) -> list[tuple[Array, Array]]:
+    """The same with the gains and variances of another filter, whose `states` are among the point's.
+
+    For equations that differ little, at a fraction of the time: the filter's covariance is most of the work.
+    What is driven by the command alone is not corrected, as in the filter itself.
+    """
+    place = [point.structure.states.index(name) for name in states]
+    white = []
+    for run, x0, one in zip(passes, point.initial, inputs, strict=True):
+        rows = run.gains.shape[1]
+        gains = np.zeros((2, len(point.structure.states), rows))
+        gains[:, place] = run.gains.reshape((2, len(states), rows))
+        error, sensitivity = innovations(point.parameters, x0, one, gains.reshape((-1, rows)))
+        white.append(whiten(error, sensitivity, run.variance))
+    return white
+
+
 def _first_noise(start: Fit, inputs: list[Inputs]) -> Array:
     """Half of what output error calls sensor noise may really be force: a neutral place to begin."""
     step = float(np.median(np.concatenate([one.drive[3] for one in inputs])))

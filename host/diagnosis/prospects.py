@@ -11,9 +11,10 @@ from host.catalogue.moments import COUNT, FIRST, LAST, SCANS, sizes
 from host.catalogue.unknown import ANY_SMOOTH_FORCE, FORMS, SHAPES
 from host.diagnosis.explanation import Explanation
 from host.equations import Effect
-from host.filter_error import whitened_innovations
+from host.filter_error import RandomForces, whitened_by, whitened_innovations
 from host.fit import Fit
 from host.gauss_newton import GaussNewton, Point
+from host.kalman import KalmanPass
 from host.output_error import diverges, residuals_at
 from host.propagate import Inputs
 from host.recording import Array
@@ -89,11 +90,11 @@ def probed(
     names = parent.names | {effect.name}
     inputs, free = fitter.inputs(names, parent.fit.has_process_noise), fitter.free(names)
     before = parent.fit.deviance
-    found = []
-    for probe in [*values, *(_probes(fitter, effect, parent) if is_thorough else [])]:
+    found, steering = [], _steering(fitter, parent, effect)
+    for probe in [*values, *(_probes(fitter, effect, parent, steering) if is_thorough else [])]:
         point = fitter.point(names, parent, effect.name, probe)
         own = np.array(point.structure.names)
-        white, cost = whitened_at(point, inputs, parent)
+        white, cost = whitened_at(point, inputs, parent, steering=steering)
         if not np.isfinite(cost):
             found.append((-np.inf, probe))
             continue
@@ -106,16 +107,36 @@ def probed(
     return found
 
 
+def _steering(fitter: "Fitter", parent: Explanation, effect: Effect) -> list[KalmanPass] | None:
+    """The parent's filter, if it has one that does for the set with the effect as well, which is new to all.
+
+    A lag of a sensor or a speed that is lost is a state that measurements correct.
+    """
+    fit = parent.fit
+    is_corrected = effect.state is not None and effect.actuator is None
+    if is_corrected or not fit.has_process_noise or fit.waves.any():
+        return None
+    point = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
+    return RandomForces(fitter.inputs(parent.names, for_filter=True)).passes(point)
+
+
 def whitened_at(
-    point: Point, inputs: list[Inputs], parent: Explanation, has_slopes: bool = True
+    point: Point,
+    inputs: list[Inputs],
+    parent: Explanation,
+    has_slopes: bool = True,
+    steering: list[KalmanPass] | None = None,
 ) -> tuple[list[tuple[Array, Array]], float]:
     """Innovations and sensitivities under the parent's noise, and the deviance: inf if lost.
 
     has_slopes  or without the sensitivities, where those of a point nearby will do; not in waves
+    steering    the parent's filter, where its gains do
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if parent.fit.waves.any():
             white = whitened_in_waves(point, inputs)
+        elif steering is not None:
+            white = whitened_by(point, inputs, steering, parent.fit.structure.states)
         elif parent.fit.has_process_noise:
             white = whitened_innovations(point, inputs, has_slopes)
         else:
@@ -125,7 +146,9 @@ def whitened_at(
         return white, np.inf if diverges(white, inputs, 1e3) else deviance
 
 
-def _probes(fitter: "Fitter", effect: Effect, parent: Explanation) -> list[Array]:
+def _probes(
+    fitter: "Fitter", effect: Effect, parent: Explanation, steering: list[KalmanPass] | None
+) -> list[Array]:
     scales = np.array([fitter.scales[scale] for scale in effect.scales or ("",) * len(effect.parameters)])
     probes = [np.array(probe) * scales for probe in effect.probes]
     if effect.periods is not None:
@@ -134,23 +157,34 @@ def _probes(fitter: "Fitter", effect: Effect, parent: Explanation) -> list[Array
             np.array([*probes[0][:-1], period]) for period in _periods(fitter, effect.periods, parent.fit)
         ]
     if effect.name in SCANS:
-        probes = [np.array([*probes[0][:-1], moment]) for moment in _moments(fitter, effect.name, parent)]
+        probes = [
+            np.array([*probes[0][:-1], moment]) for moment in _moments(fitter, effect.name, parent, steering)
+        ]
     if effect.force is not None and len(effect.size_names) == len(effect.parameters):
         # Linear in its sizes, a force is foretold best from none; far off, readings in steps mislead.
         probes.append(np.zeros(len(effect.parameters)))
     return probes
 
 
-def _moments(fitter: "Fitter", name: str, parent: Explanation) -> list[float]:
+def _moments(
+    fitter: "Fitter", name: str, parent: Explanation, steering: list[KalmanPass] | None
+) -> list[float]:
     """The times, s, at which a change of this kind would gain most on top of the parent, the best first."""
     first, last = fitter.held[FIRST], fitter.held[LAST]
-    coarse = _scanned(fitter, name, parent, first, last)
+    coarse = _scanned(fitter, name, parent, steering, first, last)
     apart = (last - first) / (COUNT + 1)
-    fine = _scanned(fitter, name, parent, coarse[0] - apart, coarse[0] + apart)
+    fine = _scanned(fitter, name, parent, steering, coarse[0] - apart, coarse[0] + apart)
     return [fine[0], *coarse[1:MOMENTS_TRIED]]
 
 
-def _scanned(fitter: "Fitter", name: str, parent: Explanation, first: float, last: float) -> list[float]:
+def _scanned(
+    fitter: "Fitter",
+    name: str,
+    parent: Explanation,
+    steering: list[KalmanPass] | None,
+    first: float,
+    last: float,
+) -> list[float]:
     """The best of the moments between two times, of those side by side only the better."""
     scan = SCANS[name]
     names = parent.names | {scan.name}
@@ -158,7 +192,8 @@ def _scanned(fitter: "Fitter", name: str, parent: Explanation, first: float, las
     own = np.array(point.structure.names)
     limits = np.where(own == FIRST, first, np.where(own == LAST, last, point.parameters))
     point = replace(point, parameters=limits)
-    white, cost = whitened_at(point, fitter.inputs(names, parent.fit.has_process_noise), parent)
+    inputs = fitter.inputs(names, parent.fit.has_process_noise)
+    white, cost = whitened_at(point, inputs, parent, steering=steering)
     times = first + (last - first) * np.arange(1, COUNT + 1) / (COUNT + 1)
     if not np.isfinite(cost):
         return [float(time) for time in times[COUNT // 6 :: COUNT // 6]]

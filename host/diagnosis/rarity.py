@@ -4,7 +4,8 @@ A vehicle on which two of the effects show that every real one has, has all of t
 seldom acts may look likelier there only because it does the work of several of these at once, each too weak
 to pay for itself: a slow attitude filter that of a servo and a little coupling. So each such member is left
 out, all that every vehicle has joins, and what of it does not pay is dropped; the set without the rare member
-is preferred until the one with it is 50 times as likely.
+is preferred until the one with it is 50 times as likely. Nor is named there what explains a hundredth of the
+sensors' noise or less, however significant: the forms of drags and speed loss are not exact to that.
 """
 
 from typing import TYPE_CHECKING
@@ -21,6 +22,7 @@ from host.gauss_newton import Point
 if TYPE_CHECKING:
     from host.diagnosis.search import Search
 
+SLIGHT = 0.01  # of BIC a sample: of the noise's variance
 REAL = 2  # effects that every vehicle has, shown by one that is no textbook's
 
 
@@ -28,6 +30,7 @@ def told_by_the_usual(search: "Search", best: Explanation) -> Explanation:
     """The set, or one with a rare member less that is not clearly less likely."""
     if len(best.names & {*ORDINARY}) < REAL or search.root.fit.has_process_noise:
         return best
+    best = _without_the_slight(search, best)
     rare = sorted(name for name in best.names & BY_NAME.keys() if not _is_usual(name))
     if not rare:
         return best
@@ -41,6 +44,16 @@ def told_by_the_usual(search: "Search", best: Explanation) -> Explanation:
         if lean.bic < best.bic + TWIN_MARGIN:
             best = lean
             _tell_twins(search, best, name)
+    return best
+
+
+def _without_the_slight(search: "Search", best: Explanation) -> Explanation:
+    """The set less the members, but those of every vehicle, that hardly matter."""
+    while members := sorted(name for name in best.names & BY_NAME.keys() if name not in ORDINARY):
+        least = min(search.each_without(best, members), key=lambda one: one.bic)
+        if least.bic > best.bic + SLIGHT * best.fit.samples:
+            break
+        best = least
     return best
 
 
