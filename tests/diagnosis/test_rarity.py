@@ -67,15 +67,15 @@ def test_a_rare_effect_stays_whose_work_nothing_usual_does() -> None:
     assert told_by_the_usual(search, best).names >= {"pitch_sensor_lag"}
 
 
-@pytest.mark.parametrize(("slight", "is_named"), [(0.01, True), (0.3, False)])
+@pytest.mark.parametrize(("slight", "is_named"), [(0.01, True), (30.0, False)])
 def test_what_is_significant_but_slight_is_not_named_on_a_real_hull(
     slight: float, is_named: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recording = real_hull(hidden_dive(duration=60.0), SERVO, 60.0)
-    drifting = replace(recording, depth=recording.depth + 1e-4 * (recording.time - 30.0))
+    drifting = replace(recording, depth=recording.depth + 5e-3 * (recording.time - 30.0))
     search, best = searched(drifting, *REAL, "heave_quadratic_drag", "actuator_lag", "vertical_current")
     worth = search.without(best, "vertical_current").bic - best.bic
-    assert 0.01 * best.fit.samples < worth < 0.3 * best.fit.samples
+    assert 0.01 * best.fit.samples < worth < 30.0 * best.fit.samples
     monkeypatch.setattr(rarity, "SLIGHT", slight)
     assert ("vertical_current" in told_by_the_usual(search, best).names) is is_named
 
