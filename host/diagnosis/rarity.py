@@ -36,8 +36,10 @@ def told_by_the_usual(search: "Search", best: Explanation) -> Explanation:
         return best
     search.on_progress("what every vehicle has in place of " + " and ".join(rare))
     for name in rare:
+        if name not in best.names:
+            continue  # gone with another
         (whole,) = search.workers.results([(with_all_ordinary, (search.without(best, name),))])
-        # More coefficients can only be likelier: where they are not by far, the rare member is needed.
+        # With all of these free it must be as likely at least, or the rare member is needed.
         if 2.0 * (best.fit.log_likelihood - whole.fit.log_likelihood) > TWIN_MARGIN:
             continue
         lean = pruned(search, search.remember(whole))

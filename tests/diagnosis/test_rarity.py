@@ -56,6 +56,16 @@ def test_a_slow_attitude_filter_gives_way_to_a_servo_on_a_real_hull() -> None:
     assert "pitch_sensor_lag" in twins(search, found, "actuator_lag")
 
 
+def test_two_rare_effects_go_together_where_neither_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    recording = real_hull(hidden_dive(duration=30.0), SERVO, 30.0)
+    search, best = searched(recording, *REAL, "actuator_lag")
+    both = search.fitter.grown(search.fitter.grown(best, "depth_sensor_lag", []), "pitch_sensor_lag", [])
+    both = search.remember(search.fitter.polished(both))
+    monkeypatch.setattr(rarity, "SLIGHT", -1.0)
+    monkeypatch.setattr(rarity, "pruned", lambda *_: best)
+    assert told_by_the_usual(search, both).names == best.names
+
+
 def test_a_rare_effect_stays_whose_work_nothing_usual_does() -> None:
     recording = real_hull(hidden_dive(duration=60.0), SERVO, 60.0)
     pitch = recording.pitch.copy()
