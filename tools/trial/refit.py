@@ -66,8 +66,9 @@ def remaining(
 def foretold(model: Model, start: Array, steps: Array, least: float = 0.0) -> float:
     """The same as one step foretells it, were the model linear: for many coefficients and long runs.
 
-    Of slopes that point the same way each is free, which no fit of nonlinear equations is, so hardly less is
-    left in truth. Below `least` without any step, that is all.
+    Of what is weak it errs low, as slopes that point the same way may be followed to any length; of what is
+    very strong a fit of the equations themselves may leave several times less. Below `least` without any
+    step, that is all.
     """
     residual = model(start[None, :])[0]
     cost = float(residual @ residual)
