@@ -15,7 +15,7 @@ from host.diagnosis.foretold import foretold_errors
 from host.diagnosis.scoring import free_run_errors
 from host.diagnosis.separation import Separation
 from host.diagnosis.spans import divide
-from host.plots import MEASURED, MODEL, RUDDER, data_uri, plane_trace
+from host.plots import MEASURED, MODEL, RUDDER, data_uri, line_through, plane_trace
 from host.recording import Array, Recording
 
 BASE_COLOUR, SIMULATION_COLOUR, BAND, JUDGING = "#dd8452", "#7b5ea7", "#e3edf4", "#f3f0e6"
@@ -56,14 +56,9 @@ def runs_picture(answer: Answer) -> str:
         noise = 2.0 * scale * float(np.sqrt(found.floor[channel]))
         rest.axhspan(-noise, noise, color=BAND)
         for name, colour, errors in sides:
-            main.plot(
-                recording.time,
-                scale * (measured[channel] - errors[channel]),
-                color=colour,
-                linewidth=1.2,
-                label=name,
-            )
-            rest.plot(recording.time, scale * errors[channel], color=colour, linewidth=0.8)
+            run = scale * (measured[channel] - errors[channel])
+            line_through(main, recording.time, run, color=colour, linewidth=1.2, label=name)
+            line_through(rest, recording.time, scale * errors[channel], color=colour, linewidth=0.8)
         main.set_ylabel(label)
         rest.set_ylabel(f"left over,\n{label.split(', ')[1]}")
     if found.is_held_out:
