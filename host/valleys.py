@@ -10,6 +10,7 @@ it began; so the profile of the likelihood over a1 is walked on both sides, and 
 series with the pitch is one pole more, and so is heave where it turns the hull: which of the poles is whose,
 pitch alone does not say. Nor does it say which way the plane pushes a hull that its own heave turns. A lag of
 the depth sensor is a pole in series with heave's, and pitch-rate coupling makes up for what else differs.
+Where a plane stalls, reversals of one size hardly tell.
 """
 
 from dataclasses import replace
@@ -22,7 +23,6 @@ from host.fit import Fit, Rival
 from host.gauss_newton import Point
 from host.output_error import output_error
 from host.propagate import Inputs
-from host.recording import Array
 from host.straightened import coefficients_beside
 from host.whiteness import correlation_factor
 
@@ -39,6 +39,7 @@ USUAL_DAMPING, DAMPING_FACTOR = -1.0, 5.0  # 1/s, of a1; gliders 0.1, small quic
 INSTANT, IDLE = -10.0, -0.1
 A1, A2, A3, B1, B2, U0 = (NAMES.index(name) for name in ("a1", "a2", "a3", "b1", "b2", "u0"))
 LAGS, DEPTH_LAG, MUNK, COUPLING = ("lag_time", "pitch_lag_time"), "depth_lag_time", "c_qw", "c_wq"
+STALL, STALL_LOSS, STALL_FACTORS = "stall_angle", "stall_loss", (0.6, 0.75, 1.35, 1.7)
 SHARING_POLES = (*LAGS, DEPTH_LAG, MUNK)  # parameters of effects that bring a pole of their own
 
 
@@ -71,7 +72,33 @@ def _with_damping(point: Point, stride: float) -> Point:
 
 def look_alikes(point: Point) -> list[Point]:
     """Points whose pitch, or whose recorded depth, follows the plane like that of this one."""
-    return with_poles_swapped(point) + with_force_mirrored(point) + with_depth_lag_swapped(point)
+    return [
+        *with_poles_swapped(point),
+        *with_force_mirrored(point),
+        *with_depth_lag_swapped(point),
+        *with_stall_moved(point),
+    ]
+
+
+def with_stall_moved(point: Point) -> list[Point]:
+    """The point with a plane that stalls earlier or later, as strong at twice the angle at which it did.
+
+    Reversals of one size tell that strength, and how the plane gets there only as it passes.
+    """
+    names, values = list(point.structure.names), point.parameters
+    if STALL not in names:
+        return []
+    angle, loss = names.index(STALL), names.index(STALL_LOSS)
+    moved = []
+    for factor in STALL_FACTORS:
+        kept = 2.0 - values[loss]  # lift at twice the angle, in units of that at the angle
+        after = kept + values[loss] * (factor - 1.0)
+        if min(kept, after) > 0.0:
+            other = values.copy()
+            other[angle] *= factor
+            other[[B1, B2]] *= kept / after
+            moved.append(replace(point, parameters=point.structure.clipped(other)))
+    return moved
 
 
 def with_depth_lag_swapped(point: Point) -> list[Point]:
@@ -117,23 +144,61 @@ def with_poles_swapped(point: Point) -> list[Point]:
     [b2 (s - a1) + c_qw b1] / [(s - a1) (s^2 - a2 s - a3)], and c_qw makes up for another a1. Only depth, or
     the plane's own motion, tells these apart.
     """
+    return _with_lags_swapped(point) + _with_heave_swapped(point)
+
+
+def _with_lags_swapped(point: Point) -> list[Point]:
+    """A lag's pole -1/T and a real one of the pitch in each other's place.
+
+    Of a hull on which heave and pitch rate turn each other the poles are the zeros of
+
+        (s - a1) (s^2 - a2 s - a3) - c_qw c_wq s
+
+    and with heave as it was, c_wq makes up for the rest.
+    """
+    names, values = point.structure.names, point.parameters
+    a1, a2, a3 = values[[A1, A2, A3]]
+    own = [k for k in coefficients_beside(names, "a2") if k != A3]
+    turned = [names.index(name) for name in (MUNK, COUPLING) if name in names]
+    product = float(np.prod(values[turned])) if len(turned) == 2 else 0.0
+    poles = [1.0, -a2, -a3]
+    if product != 0.0:
+        poles = [1.0, -a1 - a2, a1 * a2 - a3 - product, a1 * a3]
+    swapped = []
+    for pole in np.roots(poles):
+        if pole.real >= 0.0 or abs(pole.imag) > NEARLY_REAL * abs(pole.real):
+            continue
+        for lag in (names.index(name) for name in LAGS if name in names):
+            moved = values.copy()
+            ratio = -1.0 / (pole.real * values[lag])  # of the new lag to the old
+            moved[lag] *= ratio
+            moved[A2] = a2 - pole.real - 1.0 / values[lag]
+            moved[A3] *= ratio
+            moved[own] *= ratio
+            if product != 0.0:
+                others = (a1 * a2 - a3 - product) + pole.real * (pole.real - a1 - a2)  # their product
+                total = a1 + a2 - pole.real  # their sum
+                middle = others - total / values[lag]
+                moved[turned[1]] = (a1 * moved[A2] - moved[A3] - middle) / moved[turned[0]]
+            swapped.append(moved)
+    return [replace(point, parameters=point.structure.clipped(moved)) for moved in swapped]
+
+
+def _with_heave_swapped(point: Point) -> list[Point]:
     names, values = point.structure.names, point.parameters
     a1, a2, a3, b1, b2 = values[[A1, A2, A3, B1, B2]]
     poles = np.roots([1.0, -a2, -a3])
+    if MUNK not in names or a1 >= 0.0 or b1 == 0.0:
+        return []
     if np.abs(poles.imag).max() > NEARLY_REAL * np.abs(poles.real).max() or poles.real.max() >= 0.0:
         return []
-    swapped, moments = [], [k for k in coefficients_beside(names, "a2") if k != A3]
+    swapped = []
     for pole, stays in (poles.real, poles.real[::-1]):
-        for lag in (names.index(name) for name in LAGS if name in names):
-            moved = _with_pitch_poles(values, stays, -1.0 / values[lag])
-            moved[lag] = -1.0 / pole
-            moved[moments] *= moved[A3] / a3
-            swapped.append(moved)
-        if MUNK in names and a1 < 0.0 and b1 != 0.0:
-            moved = _with_pitch_poles(values, stays, a1)
-            moved[A1] = pole
-            moved[names.index(MUNK)] += b2 * (pole - a1) / b1
-            swapped.append(moved)
+        moved = values.copy()
+        moved[[A2, A3]] = stays + a1, -stays * a1
+        moved[A1] = pole
+        moved[names.index(MUNK)] += b2 * (pole - a1) / b1
+        swapped.append(moved)
     return [replace(point, parameters=point.structure.clipped(moved)) for moved in swapped]
 
 
@@ -156,12 +221,6 @@ def with_usual_heave(start: Point) -> list[Point]:
         parameters[[A1, B1]] = USUAL_DAMPING, force
         starts.append(replace(start, parameters=parameters))
     return starts
-
-
-def _with_pitch_poles(values: Array, one: float, other: float) -> Array:
-    moved = values.copy()
-    moved[[A2, A3]] = one + other, -one * other
-    return moved
 
 
 def plausibility(fit: Fit) -> float:

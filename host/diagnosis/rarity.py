@@ -10,25 +10,23 @@ sensors' noise or less, however significant: the forms of drags and speed loss a
 
 from typing import TYPE_CHECKING
 
-from host.catalogue import BY_NAME, ORDINARY, named, structure_of
+from host.catalogue import BY_NAME, ORDINARY, named
 from host.catalogue.kin import measure_alike
-from host.diagnosis.explanation import Explanation, Names
+from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import TWIN_MARGIN
 from host.diagnosis.pruning import pruned
-from host.diagnosis.starts import idle_values
-from host.gauss_newton import Point
+from host.diagnosis.whole_vehicle import is_real, with_all_ordinary
 
 if TYPE_CHECKING:
     from host.diagnosis.search import Search
 
 SLIGHT = 0.01  # of BIC a sample: of the noise's variance
-REAL = 2  # effects that every vehicle has, shown by one that is no textbook's
 
 
 def told_by_the_usual(search: "Search", best: Explanation) -> Explanation:
     """The set, or one with a rare member less that is not clearly less likely."""
-    if len(best.names & {*ORDINARY}) < REAL or search.root.fit.has_process_noise:
+    if not is_real(best.names) or search.root.fit.has_process_noise:
         return best
     best = _without_the_slight(search, best)
     rare = sorted(name for name in best.names & BY_NAME.keys() if not _is_usual(name))
@@ -57,18 +55,6 @@ def _without_the_slight(search: "Search", best: Explanation) -> Explanation:
             break
         best = least
     return best
-
-
-def with_all_ordinary(fitter: Fitter, parent: Explanation) -> Explanation:
-    """The set with all that every vehicle has, from where that hardly acts yet."""
-    names = parent.names | {*ORDINARY}
-    return fitter.explained(names, fitter.carried_on(_begun(fitter, parent, names)))
-
-
-def _begun(fitter: Fitter, parent: Explanation, names: Names) -> Point:
-    fit = parent.fit
-    known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
-    return Point(structure_of(names), idle_values(fitter, names, known), fit.initial, fit.levels)
 
 
 def _is_usual(name: str) -> bool:

@@ -30,6 +30,7 @@ from host.diagnosis.prospects import gain
 from host.diagnosis.pruning import pruned
 from host.diagnosis.rarity import told_by_the_usual
 from host.diagnosis.together import completed, together
+from host.diagnosis.whole_vehicle import whole
 from host.diagnosis.workers import Task, Workers
 from host.recording import Array
 
@@ -105,7 +106,7 @@ class Search:
         self.on_progress("settling")
         if self.follows_no_free_run:
             return min((e for e in self.tried.values() if FREE_TRIM.name not in e.names), key=lambda e: e.bic)
-        return told_by_the_usual(self, completed(self, self._settled(with_best_offsets(self))))
+        return told_by_the_usual(self, whole(self, completed(self, self._settled(with_best_offsets(self)))))
 
     def singles(self) -> list[Explanation]:
         """Each effect alone on top of the root."""

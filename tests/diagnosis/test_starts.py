@@ -18,7 +18,13 @@ from host.gauss_newton import Point
 from host.output_error import output_error
 from host.propagate import free_run, inputs_of
 from host.recording import Array, Recording
-from host.valleys import other_valleys, with_depth_lag_swapped, with_force_mirrored, with_poles_swapped
+from host.valleys import (
+    other_valleys,
+    with_depth_lag_swapped,
+    with_force_mirrored,
+    with_poles_swapped,
+    with_stall_moved,
+)
 
 AT_REST = np.array([0.0, 0.0, 0.0, 20.0])
 WEAKENED_AT = 31.3  # under a large plane angle, so that the recording can tell
@@ -175,6 +181,24 @@ def test_a_lag_and_a_pole_of_pitch_may_trade_places(name: str, others: dict[str,
         assert np.abs(one.parameters[:6] - point.parameters[:6]).max() > 0.1
 
 
+def test_a_lag_may_trade_places_with_a_pole_that_heave_and_pitch_share() -> None:
+    rows = hidden_dive(duration=30.0)
+    structure = structure_of(("munk_moment", "heave_pitch_rate_coupling", "pitch_sensor_lag"))
+    rows.rudder[:5] = 0.0  # from where a lagging reading begins
+    turned = {"heave_offset": 0.0, "pitch_offset": 0.0, "c_qw": 1.0, "c_wq": 1.9, "pitch_lag_time": 3.0}
+    known = {**BASE, "a1": -0.39, "a2": -2.1, "a3": -4.7, "b1": 0.9, **turned}
+    point = Point(structure, np.array([known[name] for name in structure.names]), [AT_REST], np.zeros(4))
+    inputs = inputs_of(rows, structure)
+    true = free_run(point.parameters, AT_REST, inputs).outputs
+    (swapped,) = with_poles_swapped(point)  # the other two poles swing
+    assert 1.0 < swapped.parameters[-1] < 1.5
+    run = free_run(swapped.parameters, AT_REST, inputs).outputs
+    np.testing.assert_allclose(run[0], true[0], atol=2e-4)
+    assert np.abs(run[1] - true[1]).max() > 0.1
+    (again,) = with_poles_swapped(swapped)
+    np.testing.assert_allclose(again.parameters, point.parameters, rtol=1e-9)
+
+
 def test_heave_that_turns_the_hull_and_a_pole_of_pitch_may_trade_places() -> None:
     rows, structure = hidden_dive(duration=30.0), structure_of(("munk_moment",))
     slow = {**BASE, "a1": -0.7, "a2": -5.0, "a3": -4.0}  # poles of pitch at -1 and -4 1/s
@@ -271,6 +295,38 @@ def test_the_depth_tells_which_of_the_poles_is_the_lag() -> None:
         wrong = output_error(swapped, inputs, free)
         best = max([wrong, *other_valleys(wrong, inputs)], key=lambda fit: fit.log_likelihood)
         assert best.parameters[-1] == pytest.approx(0.5, abs=0.05)
+
+
+def test_reversals_of_one_size_hardly_tell_where_a_plane_stalls() -> None:
+    structure, names = (
+        structure_of(("rudder_stall", "actuator_lag")),
+        frozenset({"rudder_stall", "actuator_lag"}),
+    )
+    stall = {"lag_time": 0.1, "stall_angle": 0.25, "stall_loss": 1.4, "stall_share": 0.5}
+    known = {**BASE, "heave_offset": 0.0, "pitch_offset": 0.0, **stall}
+    true = np.array([known[name] for name in structure.names])
+    rows = hidden_dive(duration=90.0)
+    rows = replace(rows, rudder=0.5 * np.sign(rows.rudder), speed=np.full(rows.time.size, BASE["u0"]))
+    pitch, depth = free_run(true, AT_REST, inputs_of(rows, structure)).outputs
+    rng = np.random.default_rng(3)
+    noise = np.array([[1e-3], [5e-3]]) * rng.standard_normal((2, rows.time.size))
+    fitter = Fitter([replace(rows, pitch=pitch + noise[0], depth=depth + noise[1])])
+    angle = structure.names.index("stall_angle")
+    other = with_stall_moved(Point(structure, true, [AT_REST], np.zeros(4)))
+    assert [one.parameters[angle] for one in other] == pytest.approx([0.15, 0.1875, 0.3375, 0.425])
+    for one in other:
+        size, loss = 2.0 * 0.25, one.parameters[structure.names.index("stall_loss")]
+        lift = one.parameters[3] * (size - loss * (size - one.parameters[angle]))
+        assert lift == pytest.approx(BASE["b1"] * 0.25 * (2.0 - 1.4))
+    wrong = output_error(other[0], fitter.inputs(names), fitter.free(names))
+    assert wrong.parameters[angle] < 0.2
+    best = max(other_valleys(wrong, fitter.inputs(names)), key=lambda fit: fit.log_likelihood)
+    right = output_error(
+        Point(structure, true, [AT_REST], np.zeros(4)), fitter.inputs(names), fitter.free(names)
+    )
+    assert wrong.log_likelihood < right.log_likelihood - 10.0
+    assert best.log_likelihood > right.log_likelihood - 0.1
+    assert with_stall_moved(Point(structure_of(()), true[:8], [AT_REST], np.zeros(4))) == []
 
 
 def test_a_pitch_that_swings_has_no_pole_to_trade() -> None:

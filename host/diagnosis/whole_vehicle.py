@@ -1,0 +1,103 @@
+"""A vehicle that shows some of what every vehicle has, has all of it, strong or weak.
+
+What is too weak to pay for itself is not named; but it acts, and bends what is. So a set that shows some
+of it is fitted with all of it once: that may be far likelier in another valley than where the few were found,
+and it tells how far those that are named may be off.
+"""
+
+from dataclasses import replace
+from math import log
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from host.catalogue import ORDINARY, structure_of
+from host.diagnosis.explanation import Explanation, Names
+from host.diagnosis.margins import margin
+from host.diagnosis.pruning import pruned
+from host.diagnosis.starts import idle_values
+from host.gauss_newton import Point
+from host.uncertainty import covariance_within
+from host.valleys import are_apart, look_alikes
+
+if TYPE_CHECKING:
+    from host.diagnosis.fitter import Fitter
+    from host.diagnosis.search import Search
+
+MOST_ROUNDS = 3  # as more names see other valleys
+SHOWN = 2  # of the effects that every vehicle has: one that shows so many is no textbook's
+
+
+def is_real(names: Names) -> bool:
+    """Whether a set shows a vehicle as they are built."""
+    return len(names & {*ORDINARY}) >= SHOWN
+
+
+def whole(search: "Search", best: Explanation) -> Explanation:
+    """The set, or what is left of it with all that every vehicle has, where that is likelier.
+
+    Asked of a set that shows some of it, or that leaves something.
+    """
+    if best.fit.has_process_noise or not best.names or (best.leaves_white and not is_real(best.names)):
+        return best
+    search.on_progress("all that every vehicle has")
+    for _ in range(MOST_ROUNDS):
+        (found,) = search.workers.results([(with_all_ordinary, (best,))])
+        gain = 2.0 * (found.fit.log_likelihood - best.fit.log_likelihood)
+        if gain < log(best.fit.samples) + margin(best):
+            break  # none of them could pay
+        lean = pruned(search, search.remember(found))
+        if lean.bic >= best.bic:
+            break
+        best = lean
+    return best
+
+
+def with_all_ordinary(fitter: "Fitter", parent: Explanation) -> Explanation:
+    """The set with all that every vehicle has, from where that hardly acts yet.
+
+    In the likeliest of the valleys that the set alone can hardly tell apart.
+    """
+    fit, names = parent.fit, parent.names | {*ORDINARY}
+    here = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
+    starts = [_begun(fitter, start, names) for start in (here, *look_alikes(here))]
+    return fitter.polished(fitter.explained(names, fitter.fitted(starts)))
+
+
+def in_the_valley_of(fitter: "Fitter", whole: Explanation, found: Explanation) -> Explanation:
+    """The set in the valley in which it and all that every vehicle has are likeliest together.
+
+    Alone it may be likelier in another one, bent to do the work of what is not named; where it would lose
+    more by leaving that than the whole gains by being complete, it stays.
+    """
+    there = fitter.reduced(whole, found.names)
+    lost = found.fit.log_likelihood - there.fit.log_likelihood
+    gained = whole.fit.log_likelihood - found.fit.log_likelihood
+    return there if are_apart(there.fit, found.fit) and lost < gained else found
+
+
+def widened(std: dict[str, float], found: Explanation, whole: Explanation) -> dict[str, float]:
+    """Deviations of a set's coefficients, as far as what is not named may bend them.
+
+    var = max(var, var_w) + (p - p_w)^2 with the value and the variance beside all that every vehicle has
+    (subscript w), where each coefficient that is not named is somewhere between its bounds. A moment at which
+    something changed has no variance by curvature; it moves by the rest.
+    """
+    fit, structure = whole.fit, found.fit.structure
+    names = fit.structure.names
+    unnamed = np.array([name not in structure.names for name in names])
+    widths = np.array([p.upper - p.lower for p in fit.structure.parameters])
+    information = fit.information + np.diag(np.where(unnamed, 12.0 / widths**2, 0.0))
+    beside = np.sqrt(np.diag(covariance_within(replace(fit, information=information))))
+    beside[np.isin(names, list(structure.moments))] = 0.0
+    wider = dict(std)
+    for name, value in zip(structure.names, found.fit.parameters.tolist(), strict=True):
+        k = names.index(name)
+        if std[name] > 0.0:
+            wider[name] = float(np.hypot(max(std[name], beside[k]), value - fit.parameters[k]))
+    return wider
+
+
+def _begun(fitter: "Fitter", at: Point, names: Names) -> Point:
+    known = dict(zip(at.structure.names, at.parameters.tolist(), strict=True))
+    return Point(structure_of(names), idle_values(fitter, names, known), at.initial, at.noise)
