@@ -14,6 +14,7 @@ from host.diagnosis.sea_fits import with_waves
 from host.diagnosis.search import Search
 from host.diagnosis.seas import plain_waves
 from host.diagnosis.spans import divide, excerpt
+from host.diagnosis.whole_vehicle import is_real, with_all_ordinary
 from host.diagnosis.workers import Workers
 from host.plane_between_rows import with_moving_plane
 from host.recording import Recording
@@ -77,8 +78,9 @@ def is_likelier(
 ) -> bool:
     """Whether what was searched is explained clearly better with the plane the other way.
 
-    By the same set, by one less of its members, or by another that came close: taken the wrong way, the plane
-    is made up for by what is not there, and what is there falls behind.
+    By the same set, by one less of its members, by another that came close, or by the best with all that
+    every vehicle has: taken the wrong way, the plane is made up for by what is not there, and what is there
+    falls behind.
 
     in_own_waves  the best set among waves that were estimated beside it, if any: the search compared sets in
                   waves as they were first found, from which others may part for better ones
@@ -93,7 +95,15 @@ def is_likelier(
         if len(close) < CONTENDERS:
             close.setdefault(names, explanation)
     least = best.bic - NAMING_MARGIN
-    return any(fitter.reduced(explanation, names).bic < least for names, explanation in close.items())
+    if any(fitter.reduced(explanation, names).bic < least for names, explanation in close.items()):
+        return True
+    return is_real(best.names) and not best.fit.has_process_noise and _is_whole_likelier(fitter, search, best)
+
+
+def _is_whole_likelier(fitter: Fitter, search: Search, best: Explanation) -> bool:
+    """Whether the vehicle is likelier so with all that it has: among that is what the wrong way lacks."""
+    other = with_all_ordinary(fitter, fitter.reduced(best, best.names))
+    return other.bic < with_all_ordinary(search.fitter, best).bic - NAMING_MARGIN
 
 
 def _leaner(explanation: Explanation) -> list[Names]:

@@ -2,25 +2,28 @@
 
 A vehicle on which two of the effects show that every real one has, has all of them, strong or weak. One that
 seldom acts may look likelier there only because it does the work of several of these at once, each too weak
-to pay for itself: a slow attitude filter that of a servo and a little coupling. So each such member is left
-out, all that every vehicle has joins, and what of it does not pay is dropped; the set without the rare member
-is preferred until the one with it is 50 times as likely. Nor is named there what explains a hundredth of the
-sensors' noise or less, however significant: the forms of drags and speed loss are not exact to that.
+to pay for itself: a slow attitude filter that of a servo and a little coupling, a net weight that of the mean
+of a drag. So it must pay beside all of them, named or not; else it is left out, all that every vehicle has
+joins, and what of it does not pay is dropped: that set is preferred unless it is clearly less likely. Nor is
+named there what explains a hundredth of the sensors' noise or less, however significant: the forms of drags
+and speed loss are not exact to that.
 """
 
+from math import log
 from typing import TYPE_CHECKING
 
 from host.catalogue import BY_NAME, ORDINARY, named
 from host.catalogue.kin import measure_alike
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.margins import TWIN_MARGIN
+from host.diagnosis.margins import margin
 from host.diagnosis.pruning import pruned
 from host.diagnosis.whole_vehicle import is_real, with_all_ordinary
 
 if TYPE_CHECKING:
     from host.diagnosis.search import Search
 
+CLEARLY = 20.0  # of BIC, by which a set without it may be worse: more, and no fit of the usual does its work
 SLIGHT = 0.01  # of BIC a sample: of the noise's variance
 
 
@@ -33,18 +36,25 @@ def told_by_the_usual(search: "Search", best: Explanation) -> Explanation:
     if not rare:
         return best
     search.on_progress("what every vehicle has in place of " + " and ".join(rare))
+    (whole,) = search.workers.results([(with_all_ordinary, (best,))])
     for name in rare:
         if name not in best.names:
             continue  # gone with another
-        (whole,) = search.workers.results([(with_all_ordinary, (search.without(best, name),))])
-        # With all of these free it must be as likely at least, or the rare member is needed.
-        if 2.0 * (best.fit.log_likelihood - whole.fit.log_likelihood) > TWIN_MARGIN:
+        fewer = search.without(best, name)
+        (other,) = search.workers.results([(with_all_ordinary, (fewer,))])
+        if _pays(search, name, whole, other):
             continue
-        lean = pruned(search, search.remember(whole))
-        if lean.bic < best.bic + TWIN_MARGIN:
-            best = lean
+        lean = min(fewer, pruned(search, search.remember(other)), key=lambda e: e.bic)
+        if lean.bic < best.bic + CLEARLY:
+            best, whole = lean, other
             _tell_twins(search, best, name)
-    return best
+    return _without_the_slight(search, best)
+
+
+def _pays(search: "Search", name: str, whole: Explanation, other: Explanation) -> bool:
+    """Whether all that every vehicle has is clearly less likely without the effect."""
+    charge = log(whole.fit.samples) * search.fitter.free_parameters(frozenset({name}))
+    return 2.0 * (whole.fit.log_likelihood - other.fit.log_likelihood) > charge + margin(whole)
 
 
 def _without_the_slight(search: "Search", best: Explanation) -> Explanation:
@@ -59,7 +69,7 @@ def _without_the_slight(search: "Search", best: Explanation) -> Explanation:
 
 def _is_usual(name: str) -> bool:
     effect = named(name)
-    return effect.is_common or name in ORDINARY or bool(effect.changes)
+    return name in ORDINARY or bool(effect.changes)
 
 
 def _tell_twins(search: "Search", best: Explanation, rare: str) -> None:

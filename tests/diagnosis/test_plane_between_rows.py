@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.files import write_extended_model
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.plane_choice import by_single_effects, is_likelier, ways
+from host.diagnosis.plane_choice import _is_whole_likelier, by_single_effects, is_likelier, ways
 from host.diagnosis.sea_fits import with_waves
 from host.diagnosis.search import Search
 from host.diagnosis.workers import Workers
@@ -63,6 +63,49 @@ def dive(way: Way, *, carried: float = 0.0) -> Recording:
         pitch_rate=nan,
         step=STEP,
     )
+
+
+def real_dive(*, lag: float) -> Recording:
+    """A hull with coupling and drag whose plane follows held commands with a lag, s."""
+    time = np.arange(500) * STEP
+    commands = 0.15 * np.sin(2.7 * time) + 0.15 * np.sin(1.1 * time + 1.0) + 0.1 * np.sin(5.3 * time)
+
+    def rate(t: float, x: Array) -> list[float]:
+        w, q, theta, _, angle = x
+        command = commands[min(int(t / STEP + 1e-9), time.size - 1)]
+        return [
+            BASE["a1"] * w + 0.9 * q + BASE["b1"] * angle,
+            BASE["a2"] * q - 4.0 * q * abs(q) + BASE["a3"] * theta + BASE["b2"] * angle,
+            q,
+            w - BASE["u0"] * theta,
+            (command - angle) / lag,
+        ]
+
+    start = [0.0, 0.0, 0.0, 20.0, commands[0]]
+    states = solve_ivp(rate, (0.0, time[-1]), start, t_eval=time, rtol=1e-7, atol=1e-9, max_step=STEP / 4).y
+    rng = np.random.default_rng(4)
+    return replace(
+        dive("held"),
+        time=time,
+        pitch=states[2] + np.deg2rad(0.05) * rng.standard_normal(time.size),
+        depth=states[3] + 0.005 * rng.standard_normal(time.size),
+        rudder=commands,
+        speed=np.full(time.size, np.nan),
+        pitch_rate=np.full(time.size, np.nan),
+    )
+
+
+def test_all_that_a_vehicle_has_may_speak_for_the_other_way() -> None:
+    held = real_dive(lag=0.1)
+    fitters = {"held": Fitter([held]), "moving": Fitter([with_moving_plane(held)])}
+    names = ("heave_pitch_rate_coupling", "pitch_quadratic_damping", "actuator_delay")
+    for way, other in (("held", "moving"), ("moving", "held")):
+        search = searched(fitters[way])
+        best = search.base
+        for name in names:
+            best = search.fitter.grown(best, name, [])
+        best = search.fitter.polished(best)
+        assert _is_whole_likelier(fitters[other], search, best) is (other == "held")
 
 
 def searched(fitter: Fitter) -> Search:

@@ -10,8 +10,9 @@ from host.diagnosis import rarity
 from host.diagnosis.exchange import twins
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.rarity import told_by_the_usual
+from host.diagnosis.rarity import _pays, told_by_the_usual
 from host.diagnosis.search import Search
+from host.diagnosis.whole_vehicle import with_all_ordinary
 from host.diagnosis.workers import Workers
 from host.recording import Array, Recording
 
@@ -94,3 +95,15 @@ def test_what_is_significant_but_slight_is_not_named_on_a_real_hull(
 def test_a_textbook_s_vehicle_may_have_one_rare_effect_alone(usual: tuple[str, ...]) -> None:
     search, best = searched(hidden_dive(duration=30.0), *usual, "pitch_sensor_lag")
     assert told_by_the_usual(search, best) is best
+
+
+def test_what_pays_for_itself_must_pay_beside_all_that_every_vehicle_has() -> None:
+    recording = real_hull(hidden_dive(duration=60.0), SERVO, 60.0)
+    search, best = searched(recording, *REAL, "heave_quadratic_drag", "trim_moment")
+    whole, other = (
+        with_all_ordinary(search.fitter, one) for one in (best, search.without(best, "trim_moment"))
+    )
+    assert not _pays(search, "trim_moment", whole, other)
+    surer = replace(whole, fit=replace(whole.fit, log_likelihood=other.fit.log_likelihood + 30.0))
+    assert _pays(search, "trim_moment", surer, other)
+    assert "trim_moment" not in told_by_the_usual(search, best).names
