@@ -15,6 +15,7 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import Leftover
 from host.diagnosis.locate import Location, locate
+from host.diagnosis.minute import LEAST_ANGLE, minute_in
 from host.diagnosis.plane_choice import Way, by_single_effects, is_likelier, ways
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.sea_fits import WAVES, again_in_waves, again_under_forces, with_regular_waves
@@ -164,7 +165,7 @@ def _diagnosed(
         location=locate(longest, errors, floor, values["u0"]),
         force=unknown_force(longest, {n: values[n] for n in NAMES}, floor, fitter.accelerations),
         ranking=_ranking(search),
-        remaining=" ".join([told, *_unnamed(waves), *_other_answers(found)]),
+        remaining=" ".join([told, *_unnamed(best, waves), *_other_answers(found)]),
         has_sea=best.fit.has_process_noise,
         bic=best.bic,
         std=std,
@@ -183,8 +184,8 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
     on_progress("held-out check")
     horizon = _horizon(left)
     before, after = (misfit(one, spans, floor, horizon) for one in (search.base, model))
-    theirs = frozenset() if waves is None else waves.theirs
-    effects = [one for one in _named(search, best, spans, floor, after, horizon) if one.name not in theirs]
+    unnamed = minute_in(best) | (frozenset() if waves is None else waves.theirs)
+    effects = [one for one in _named(search, best, spans, floor, after, horizon) if one.name not in unnamed]
     if waves is not None and WAVES not in best.names:
         effects.append(NamedEffect(name=WAVES, delta_bic=waves.delta_bic))
     effects.sort(key=lambda effect: -effect.delta_bic)
@@ -258,13 +259,17 @@ def _ranking(search: Search) -> list[tuple[str, float]]:
     return sorted((pair for pair in alone if pair[1] > -inf), key=lambda pair: -pair[1])
 
 
-def _unnamed(waves: Waves | None) -> list[str]:
+def _unnamed(best: Explanation, waves: Waves | None) -> list[str]:
     """Of offsets in the model that are not named."""
-    if waves is None or not waves.theirs:
-        return []
-    listed = " and ".join(name.replace("_", " ") for name in sorted(waves.theirs))
+    angle, theirs = np.rad2deg(LEAST_ANGLE), waves.theirs if waves else frozenset()
+    reasons = {
+        f"worth less than {angle:.2f} deg of plane: too little to be named": minute_in(best),
+        "no larger than what waves themselves do on the mean: it is not named": theirs,
+    }
     return [
-        f"The model holds a {listed} no larger than what waves themselves do on the mean: it is not named."
+        f"The model holds a {' and '.join(name.replace('_', ' ') for name in sorted(names))} {reason}."
+        for reason, names in reasons.items()
+        if names
     ]
 
 

@@ -13,6 +13,7 @@ from host.catalogue import BY_NAME, ORDINARY
 from host.catalogue.kin import OFFSETS
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.leftover import SEA_DOUBT, Leftover
+from host.diagnosis.minute import minute_in
 from host.diagnosis.scoring import Misfit
 from host.diagnosis.unknown_physics import known_in, unknown_in
 
@@ -35,7 +36,7 @@ def verdict_on(
 
     waves  by how much of BIC those it was found among, if any, are likelier than no waves
     """
-    if left.is_nothing and not best.names:
+    if left.is_nothing and not best.names - minute_in(best):
         return "no_mismatch"
     # Random forces spoil a free run whatever is known: it need not be better for knowing more.
     worst = max(before.chi2 * (SEA_DOUBT if best.fit.has_process_noise else 1.0), WORSE)

@@ -1,0 +1,50 @@
+"""Offsets that no servo is true enough to notice stay in the model and get no name."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hidden_dive import BASE, hidden_dive
+
+from host.catalogue import structure_of
+from host.diagnosis.diagnose import diagnose
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.minute import LEAST_ANGLE, minute_in
+from host.diagnosis.verdict import Verdict
+
+CLIMB, TURN = abs(BASE["a1"]) * BASE["u0"], abs(BASE["b2"])  # m/s^2 and rad/s^2 a radian
+
+
+@pytest.mark.parametrize(
+    ("name", "largest"),
+    [
+        ("net_buoyancy", LEAST_ANGLE * CLIMB),
+        ("trim_moment", LEAST_ANGLE * TURN),
+        ("rudder_offset", LEAST_ANGLE),
+        ("pitch_bias", LEAST_ANGLE * BASE["b2"] / BASE["a3"]),
+        ("vertical_current", LEAST_ANGLE * BASE["u0"]),
+    ],
+)
+def test_an_offset_is_measured_by_the_angle_that_holds_it(name: str, largest: float) -> None:
+    base, structure = Fitter([hidden_dive(duration=20.0)]).base, structure_of((name, "actuator_lag"))
+
+    def with_offset(size: float) -> Explanation:
+        own = BASE | {"heave_offset": 0.0, "pitch_offset": 0.0, "lag_time": 1e-5}
+        values = np.array([own.get(n, size) for n in structure.names])
+        return Explanation(
+            frozenset({name, "actuator_lag"}), replace(base.fit, structure=structure, parameters=values), 0.0
+        )
+
+    assert minute_in(with_offset(-0.99 * largest)) == {name}
+    assert minute_in(with_offset(1.01 * largest)) == frozenset()
+
+
+@pytest.mark.parametrize(("moment", "verdict"), [(1.2e-4, "no_mismatch"), (1.2e-2, "explained")])
+def test_a_minute_moment_is_modelled_and_not_named(moment: float, verdict: Verdict) -> None:
+    recording = hidden_dive(lambda *_: (0.0, moment, 0.0), duration=120.0, noise=0.02)
+    found = diagnose([replace(recording, speed=np.full(recording.time.size, BASE["u0"]))])
+    assert found.verdict == verdict
+    assert found.extended.names & {"trim_moment", "rudder_offset", "net_buoyancy"}
+    assert bool(found.effects) is (verdict == "explained")
+    assert ("too little to be named" in found.remaining) is (verdict == "no_mismatch")
