@@ -148,7 +148,7 @@ def with_poles_swapped(point: Point) -> list[Point]:
 
 
 def _with_lags_swapped(point: Point) -> list[Point]:
-    """A lag's pole -1/T and a real one of the pitch in each other's place.
+    """A lag's pole -1/T and a real one of the pitch in each other's place: one of its own, or of the hull's.
 
     Of a hull on which heave and pitch rate turn each other the poles are the zeros of
 
@@ -158,42 +158,45 @@ def _with_lags_swapped(point: Point) -> list[Point]:
     """
     names, values = point.structure.names, point.parameters
     a1, a2, a3 = values[[A1, A2, A3]]
-    own = [k for k in coefficients_beside(names, "a2") if k != A3]
     turned = [names.index(name) for name in (MUNK, COUPLING) if name in names]
     product = float(np.prod(values[turned])) if len(turned) == 2 else 0.0
-    poles = [1.0, -a2, -a3]
+    middle = a1 * a2 - a3 - product
+    own = [(pole, False) for pole in _real_poles(1.0, -a2, -a3)]
     if product != 0.0:
-        poles = [1.0, -a1 - a2, a1 * a2 - a3 - product, a1 * a3]
+        own += [(pole, True) for pole in _real_poles(1.0, -a1 - a2, middle, a1 * a3)]
+    beside = [k for k in coefficients_beside(names, "a2") if k != A3]
     swapped = []
-    for pole in np.roots(poles):
-        if pole.real >= 0.0 or abs(pole.imag) > NEARLY_REAL * abs(pole.real):
-            continue
+    for pole, is_shared in own:
         for lag in (names.index(name) for name in LAGS if name in names):
             moved = values.copy()
-            ratio = -1.0 / (pole.real * values[lag])  # of the new lag to the old
+            ratio = -1.0 / (pole * values[lag])  # of the new lag to the old
             moved[lag] *= ratio
-            moved[A2] = a2 - pole.real - 1.0 / values[lag]
+            moved[A2] = a2 - pole - 1.0 / values[lag]
             moved[A3] *= ratio
-            moved[own] *= ratio
-            if product != 0.0:
-                others = (a1 * a2 - a3 - product) + pole.real * (pole.real - a1 - a2)  # their product
-                total = a1 + a2 - pole.real  # their sum
-                middle = others - total / values[lag]
-                moved[turned[1]] = (a1 * moved[A2] - moved[A3] - middle) / moved[turned[0]]
+            moved[beside] *= ratio
+            if is_shared:
+                others, total = middle + pole * (pole - a1 - a2), a1 + a2 - pole  # their product and sum
+                new = others - total / values[lag]
+                moved[turned[1]] = (a1 * moved[A2] - moved[A3] - new) / moved[turned[0]]
             swapped.append(moved)
     return [replace(point, parameters=point.structure.clipped(moved)) for moved in swapped]
 
 
+def _real_poles(*polynomial: float) -> list[float]:
+    """Those of a polynomial that damp and hardly swing."""
+    poles = np.roots(polynomial)
+    return [float(p.real) for p in poles if p.real < 0.0 and abs(p.imag) <= NEARLY_REAL * abs(p.real)]
+
+
 def _with_heave_swapped(point: Point) -> list[Point]:
+    """Heave's pole and one of the pitch in each other's place, where heave turns the hull."""
     names, values = point.structure.names, point.parameters
     a1, a2, a3, b1, b2 = values[[A1, A2, A3, B1, B2]]
-    poles = np.roots([1.0, -a2, -a3])
-    if MUNK not in names or a1 >= 0.0 or b1 == 0.0:
-        return []
-    if np.abs(poles.imag).max() > NEARLY_REAL * np.abs(poles.real).max() or poles.real.max() >= 0.0:
+    poles = _real_poles(1.0, -a2, -a3)
+    if MUNK not in names or len(poles) < 2 or a1 >= 0.0 or b1 == 0.0:
         return []
     swapped = []
-    for pole, stays in (poles.real, poles.real[::-1]):
+    for pole, stays in (poles, poles[::-1]):
         moved = values.copy()
         moved[[A2, A3]] = stays + a1, -stays * a1
         moved[A1] = pole

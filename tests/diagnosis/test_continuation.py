@@ -169,8 +169,8 @@ def test_a_hull_that_was_taken_for_a_slow_servo_is_asked_about_the_other_way_rou
     with Workers(fitter, 1) as workers:
         assert continued(search_of(workers, fitter), NAMES, most_beside=0) is None
     known = [dict(zip(point.structure.names, point.parameters, strict=True)) for point in asked]
-    (right,) = [one for one in known if one["lag_time"] == pytest.approx(0.1, abs=0.01)]
-    assert {name: right[name] for name in LONG} == pytest.approx(LONG, rel=0.02)
+    near = [one for one in known if one["lag_time"] == pytest.approx(0.1, abs=0.01)]
+    assert any({name: one[name] for name in LONG} == pytest.approx(LONG, rel=0.02) for one in near)
 
 
 def test_a_damping_that_began_at_next_to_nothing_grows(monkeypatch: pytest.MonkeyPatch) -> None:
