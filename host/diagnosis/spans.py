@@ -10,12 +10,13 @@ from host.recording import Recording
 
 SHORTEST_DIVIDED = 48.0  # s; a shorter recording judges as a whole or not at all
 SHORTEST_SPAN = 8.0  # s; a free run over less says little
-JUDGING_SHARE = 0.1  # of a recording, in each of two spans
+JUDGING_SHARE, MOST_JUDGING = 0.1, 0.2  # of a recording, in each of two spans: usually, and of a slow sensor
 ALARM_LATE = 90.0  # s, by which an alarm may come after what it tells of
 LONGEST_RUN = 600.0  # s; a teaching run starts anew after so long, or the smallest drift would rule it
 LONG = 8000  # rows of all teaching runs, beyond which a search begins with an excerpt
 EXCERPT, PIECE = 4000, 2000  # rows of an excerpt, and at least of each of its pieces
 LEAST_MEASURED = 20  # values of each channel, for a span to be of use
+ENOUGH = 1.2  # times as many: readings do not come evenly
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +92,7 @@ def _set_aside(recording: Recording) -> list[tuple[float, float]]:
     """Where a recording judges, s: teaching data on both sides of each, and of an alarm's change as well."""
     begins, ends = float(recording.time[0]), float(recording.time[-1])
     length = max(SHORTEST_SPAN, JUDGING_SHARE * recording.duration)
+    length = max(length, min(_long_enough(recording), MOST_JUDGING * recording.duration))
     if recording.duration < SHORTEST_DIVIDED:
         return []
     if not recording.alarms:
@@ -105,9 +107,17 @@ def _set_aside(recording: Recording) -> list[tuple[float, float]]:
     ]
 
 
+def _long_enough(recording: Recording) -> float:
+    """s, in which the slower sensor is read often enough for a span to be of use."""
+    return ENOUGH * LEAST_MEASURED * recording.duration / max(_readings(recording), 1)
+
+
+def _readings(recording: Recording) -> int:
+    return int(min(np.isfinite(recording.depth).sum(), np.isfinite(recording.pitch).sum()))
+
+
 def _is_measured(recording: Recording) -> bool:
-    measured = min(np.isfinite(recording.depth).sum(), np.isfinite(recording.pitch).sum())
-    return bool(measured >= LEAST_MEASURED)
+    return _readings(recording) >= LEAST_MEASURED
 
 
 def _blanked(recording: Recording, start: float, end: float) -> Recording:

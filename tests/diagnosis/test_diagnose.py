@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,16 @@ def test_judging_spans_teach_nothing() -> None:
     (unseen,) = spans.unseen
     np.testing.assert_array_equal(np.isfinite(unseen.depth), judged)
     np.testing.assert_array_equal(unseen.depth[judged], recording.depth[judged])
+
+
+@pytest.mark.parametrize(("every", "readings"), [(5, [24, 24]), (10, [])])
+def test_a_slow_sensor_judges_by_longer_stretches_while_these_leave_enough_to_learn(
+    every: int, readings: list[int]
+) -> None:
+    recording = hidden_dive(duration=90.0)
+    slow = np.where(np.arange(recording.time.size) % every == 0, recording.depth, np.nan)
+    judging = divide([replace(recording, depth=slow)]).judging
+    assert [int(np.isfinite(span.depth).sum()) for span in judging] == readings
 
 
 def test_of_many_short_dives_every_third_judges() -> None:
