@@ -18,7 +18,7 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import margin
 from host.diagnosis.pruning import pruned
-from host.diagnosis.whole_vehicle import is_real, with_all_ordinary
+from host.diagnosis.whole_vehicle import OFF_CENTRE, is_real, with_all_ordinary
 
 if TYPE_CHECKING:
     from host.diagnosis.search import Search
@@ -69,7 +69,7 @@ def _without_the_slight(search: "Search", best: Explanation) -> Explanation:
 
 def _is_usual(name: str) -> bool:
     effect = named(name)
-    return name in ORDINARY or bool(effect.changes)
+    return name in {*ORDINARY, OFF_CENTRE} or bool(effect.changes)
 
 
 def _tell_twins(search: "Search", best: Explanation, rare: str) -> None:

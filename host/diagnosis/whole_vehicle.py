@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from host.diagnosis.search import Search
 
 MOST_ROUNDS = 3  # as more names see other valleys
+OFF_CENTRE = "heave_pitch_acceleration_coupling"  # weak: no hull carries its water quite about its middle
 SHOWN = 2  # of the effects that every vehicle has: one that shows so many is no textbook's
 
 
@@ -58,7 +59,7 @@ def with_all_ordinary(fitter: "Fitter", parent: Explanation) -> Explanation:
 
     In the likeliest of the valleys that the set alone can hardly tell apart.
     """
-    fit, names = parent.fit, parent.names | {*ORDINARY}
+    fit, names = parent.fit, parent.names | {*ORDINARY, OFF_CENTRE}
     here = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
     starts = [_begun(fitter, start, names) for start in (here, *look_alikes(here))]
     return fitter.polished(fitter.explained(names, fitter.fitted(starts)))

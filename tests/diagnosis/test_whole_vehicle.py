@@ -11,7 +11,14 @@ from host.catalogue import ORDINARY, structure_of
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.search import Search
-from host.diagnosis.whole_vehicle import in_the_valley_of, is_real, whole, widened, with_all_ordinary
+from host.diagnosis.whole_vehicle import (
+    OFF_CENTRE,
+    in_the_valley_of,
+    is_real,
+    whole,
+    widened,
+    with_all_ordinary,
+)
 from host.diagnosis.workers import Workers
 from host.gauss_newton import Point
 from host.output_error import output_error
@@ -79,7 +86,7 @@ def test_a_set_that_is_nobody_s_vehicle_is_left_alone() -> None:
 def test_what_is_not_named_bends_the_rest_and_the_intervals_tell() -> None:
     fitter, best = few()
     all_of_it = with_all_ordinary(fitter, best)
-    assert all_of_it.names == {*FEW, *ORDINARY}
+    assert all_of_it.names == {*FEW, *ORDINARY, OFF_CENTRE}
     std = deviations_of(best)
     wider = widened(std, best, all_of_it)
     truth = BASE | TURNED
