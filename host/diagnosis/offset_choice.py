@@ -45,6 +45,18 @@ def with_best_offsets(search: "Search") -> Explanation:
     return best
 
 
+def with_likeliest_offsets(search: "Search", best: Explanation) -> Explanation:
+    """The set with an offset exchanged for another, where that is likelier beside its other members.
+
+    Beside others another may have been: a slow sensor in the place of a servo shifts the steady state, too.
+    """
+    mine, offsets = best.names & {*OFFSETS}, frozenset(OFFSETS)
+    ways = {mine - {member} | {other} for member in mine for other in offsets - mine}
+    tasks: list[Task] = [(retrimmed, (best, way)) for way in sorted(ways, key=sorted)]
+    found = [search.remember(e) for e in search.workers.results(tasks)]
+    return min([best, *search.polished_near(found, best.bic)], key=lambda e: e.bic)
+
+
 def with_offset(search: "Search", beam: list[Explanation]) -> list[Explanation]:
     """The beam, before it the best of its sets with an offset, if that explains more than the free trim.
 

@@ -25,7 +25,7 @@ from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.lone_form import lone_form
 from host.diagnosis.margins import FEW, LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN, ROUGH, SMALL, margin
-from host.diagnosis.offset_choice import with_best_offsets, with_offset
+from host.diagnosis.offset_choice import with_best_offsets, with_likeliest_offsets, with_offset
 from host.diagnosis.prospects import gain
 from host.diagnosis.pruning import pruned
 from host.diagnosis.rarity import told_by_the_usual
@@ -106,7 +106,9 @@ class Search:
         self.on_progress("settling")
         if self.follows_no_free_run:
             return min((e for e in self.tried.values() if FREE_TRIM.name not in e.names), key=lambda e: e.bic)
-        return told_by_the_usual(self, whole(self, completed(self, self._settled(with_best_offsets(self)))))
+        found = self._settled(with_best_offsets(self))
+        best = told_by_the_usual(self, whole(self, completed(self, found)))
+        return best if best is found else with_likeliest_offsets(self, best)
 
     def singles(self) -> list[Explanation]:
         """Each effect alone on top of the root."""

@@ -10,6 +10,7 @@ from host.diagnosis import rarity
 from host.diagnosis.exchange import twins
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.offset_choice import with_likeliest_offsets
 from host.diagnosis.rarity import _pays, told_by_the_usual
 from host.diagnosis.search import Search
 from host.diagnosis.whole_vehicle import with_all_ordinary
@@ -19,8 +20,8 @@ from host.recording import Array, Recording
 SERVO, FILTER = 0.06, 0.5  # s
 
 
-def real_hull(rows: Recording, servo: float, duration: float) -> Recording:
-    """Coupling, drag across the hull and in pitch, and a servo with a lag."""
+def real_hull(rows: Recording, servo: float, duration: float, trim: float = 0.0) -> Recording:
+    """Coupling, drag across the hull and in pitch, a servo with a lag, and a moment."""
     begins, delta = np.empty(rows.time.size), 0.0
     for k, command in enumerate(rows.rudder):
         begins[k] = delta
@@ -31,7 +32,8 @@ def real_hull(rows: Recording, servo: float, duration: float) -> Recording:
         k = min(int(time / rows.step), rows.time.size - 1)
         off = (begins[k] - rows.rudder[k]) * np.exp(-(time - rows.time[k]) / servo)
         off += rows.rudder[k] - plane
-        return 0.9 * q - 2.0 * w * abs(w) + BASE["b1"] * off, -4.0 * q * abs(q) + BASE["b2"] * off, 0.0
+        moment = trim - 4.0 * q * abs(q) + BASE["b2"] * off
+        return 0.9 * q - 2.0 * w * abs(w) + BASE["b1"] * off, moment, 0.0
 
     return hidden_dive(force, duration=duration)
 
@@ -107,3 +109,11 @@ def test_what_pays_for_itself_must_pay_beside_all_that_every_vehicle_has() -> No
     surer = replace(whole, fit=replace(whole.fit, log_likelihood=other.fit.log_likelihood + 30.0))
     assert _pays(search, "trim_moment", surer, other)
     assert "trim_moment" not in told_by_the_usual(search, best).names
+
+
+def test_an_offset_is_asked_again_beside_what_took_the_place_of_another() -> None:
+    recording = real_hull(hidden_dive(duration=60.0), SERVO, 60.0, 0.05)
+    search, best = searched(recording, *REAL, "heave_quadratic_drag", "actuator_lag", "rudder_offset")
+    assert with_likeliest_offsets(search, best).names == best.names - {"rudder_offset"} | {"trim_moment"}
+    plain = search.without(best, "rudder_offset")
+    assert with_likeliest_offsets(search, plain) is plain
