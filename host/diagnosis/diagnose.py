@@ -25,7 +25,7 @@ from host.diagnosis.spans import Spans, divide, excerpt
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.unknown_physics import known_in
 from host.diagnosis.verdict import Verdict, remaining, verdict_on
-from host.diagnosis.whole_vehicle import in_the_valley_of, is_real, widened, with_all_ordinary
+from host.diagnosis.whole_vehicle import beside_all, in_the_valley_of, widened
 from host.diagnosis.workers import Workers
 from host.equations import NAMES, Slot
 from host.identifiability import ambiguity
@@ -133,9 +133,8 @@ def _diagnosed(
     base = _refitted(search.base, recordings)
     found = extended = _refitted(best if waves is None else waves.fitted, recordings)
     whole = Fitter(recordings, known=found)
-    complete = None
-    if is_real(found.names) and not found.fit.has_process_noise:
-        complete = with_all_ordinary(whole, found)
+    complete = beside_all(whole, found)
+    if complete is not None:
         found = extended = in_the_valley_of(whole, complete, found)
     # Of a short recording they take less time than new processes.
     with Workers(whole, jobs if is_part else 1) as workers:

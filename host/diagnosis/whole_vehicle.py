@@ -10,8 +10,9 @@ from math import log
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.stats import chi2
 
-from host.catalogue import ORDINARY, structure_of
+from host.catalogue import BY_NAME, ORDINARY, structure_of
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.margins import margin
 from host.diagnosis.pruning import pruned
@@ -19,6 +20,7 @@ from host.diagnosis.starts import idle_values
 from host.gauss_newton import Point
 from host.uncertainty import covariance_within
 from host.valleys import are_apart, look_alikes
+from host.whiteness import correlation_factor
 
 if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 
 MOST_ROUNDS = 3  # as more names see other valleys
 OFF_CENTRE = "heave_pitch_acceleration_coupling"  # weak: no hull carries its water quite about its middle
+BY_CHANCE = 1e-3
 SHOWN = 2  # of the effects that every vehicle has: one that shows so many is no textbook's
 
 
@@ -63,6 +66,21 @@ def with_all_ordinary(fitter: "Fitter", parent: Explanation) -> Explanation:
     here = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
     starts = [_begun(fitter, start, names) for start in (here, *look_alikes(here))]
     return fitter.polished(fitter.explained(names, fitter.fitted(starts)))
+
+
+def beside_all(fitter: "Fitter", found: Explanation) -> Explanation | None:
+    """A set with all that every vehicle has, where that acts beside it, named or not; else None.
+
+    It does where two of these are named, or where all together tell: twice their gain in log-likelihood is
+    that of chance, chi2 of as many degrees as they have coefficients, once in a thousand sets.
+    """
+    if found.fit.has_process_noise or not found.names & BY_NAME.keys():
+        return None
+    complete = with_all_ordinary(fitter, found)
+    gain = 2.0 * (complete.fit.log_likelihood - found.fit.log_likelihood)
+    more = fitter.free_parameters(complete.names) - fitter.free_parameters(found.names)
+    by_chance = chi2.isf(BY_CHANCE, more) * correlation_factor(found.fit.whitened)
+    return complete if is_real(found.names) or gain > by_chance else None
 
 
 def in_the_valley_of(fitter: "Fitter", whole: Explanation, found: Explanation) -> Explanation:

@@ -13,6 +13,7 @@ from host.diagnosis.fitter import Fitter
 from host.diagnosis.search import Search
 from host.diagnosis.whole_vehicle import (
     OFF_CENTRE,
+    beside_all,
     in_the_valley_of,
     is_real,
     whole,
@@ -156,3 +157,14 @@ def test_the_whole_is_found_from_the_other_valley() -> None:
     by_far = replace(wrong, fit=replace(wrong.fit, log_likelihood=all_of_it.fit.log_likelihood))
     assert in_the_valley_of(fitter, all_of_it, by_far) is by_far
     assert in_the_valley_of(fitter, all_of_it, right) is right
+
+
+def test_what_is_not_named_is_told_by_all_of_it_together() -> None:
+    fitter, best = few()
+    assert beside_all(fitter, best) is not None  # two of them are named
+    one = fitter.polished(fitter.grown(fitter.base, "munk_moment", []))
+    assert beside_all(fitter, one) is not None  # the others show
+    textbook = Fitter([hidden_dive(lambda _, x, __: (0.0, 1.0 * x[0], 0.0), duration=60.0)])
+    alone = textbook.polished(textbook.grown(textbook.base, "munk_moment", []))
+    assert beside_all(textbook, alone) is None
+    assert beside_all(textbook, textbook.base) is None
