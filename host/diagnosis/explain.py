@@ -14,6 +14,7 @@ from host.diagnosis.search import Search
 from host.diagnosis.seas import (
     Explained,
     again_astray,
+    against,
     among_waves,
     explains_more,
     in_a_sea,
@@ -37,21 +38,28 @@ def explain(
         return again_astray(fitter, workers, on_progress, part)
     known = None if part is None else part.search
     search = Search(fitter, workers, on_progress, fitter.base, fitter.root, known, way.alone)
+    waves = way.waves if part is None else None
+    plain = None if waves is None else in_plain_waves(search, waves)
+    # What waves and a few effects explain needs no dozen effects without waves.
+    search.is_for_few = plain is not None and plain.left.is_nothing
     again = [fitter.refitted(one) for one in _found_in(part)] if part else _alike(fitter, like)
     best = search.run(again)
-    waves = way.waves if part is None else None
     left, told = leftover(fitter, best), None
+    if waves is not None and plain is not None:
+        plain = against(plain, waves, best)
     may_be_sea = part is None or part.best.fit.has_process_noise
     is_astray = may_be_sea and not (left.is_nothing or best.fit.has_process_noise)
     if is_astray and (led := led_astray(search, best)) is not None:
         left_then = leftover(fitter, led[1])
         if search.follows_no_free_run or left_then.is_nothing:
             return Explained(led[1], led[0], left_then, None)
+    if plain is not None and plain.left.is_nothing and not left.is_nothing:
+        return plain
     if best.names or not left.is_nothing:
         best = with_unknown(search, best)
         left = leftover(fitter, best)
     if may_be_sea and (unknown_in(best) or not left.is_nothing):
-        calm, plain = best, None if waves is None else in_plain_waves(search, best, waves)
+        calm = best
         if plain is not None and plain.left.is_nothing:
             return plain
         search, best = in_a_sea(search, best)

@@ -56,6 +56,7 @@ class Search:
     alone  each effect alone, where these were fitted before
     rivals  sets that were fitted in an exchange
     joint   sets with all that every vehicle has
+    is_for_few  not for all that every vehicle has at once: something else explains the recordings
     steered  what a continuation found likeliest while forces still steered the state
     """
 
@@ -70,6 +71,7 @@ class Search:
     rivals: set[Names] = field(default_factory=set)
     joint: set[Names] = field(default_factory=set)
     steered: Explanation | None = None
+    is_for_few: bool = False
     _shrunk: dict[Names, set[Names]] = field(default_factory=dict)  # those fitted from larger sets: which
     _polished: set[Names] = field(default_factory=set)  # those of them fitted to the end
 
@@ -208,7 +210,7 @@ class Search:
 
     def _needs_many(self, leading: Explanation, size: int) -> bool:
         """Whether it is time, once, to try all that every vehicle has: far too much is left, or too much."""
-        if size == 1 or self.joint or self.root.fit.has_process_noise:
+        if size == 1 or self.joint or self.is_for_few or self.root.fit.has_process_noise:
             return False
         return self.fitter.excess(leading.fit) > (MUCH if size <= SMALL else LITTLE)
 

@@ -1,7 +1,7 @@
 """Searches under random forces: where the sea moves the vehicle, and where it does so with a wave's swing."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from math import inf
 from typing import NamedTuple
@@ -134,16 +134,21 @@ def plain_waves(fitter: Fitter) -> Explanation | None:
     return waves if is_sea(waves.fit) else None
 
 
-def in_plain_waves(calm: Search, best: Explanation, waves: Explanation) -> Explained | None:
-    """The search among waves that were plain to see, where they explain more than the best without them.
+def in_plain_waves(calm: Search, waves: Explanation) -> Explained:
+    """The search among waves that were plain to see.
 
     Where something is left then, what is hidden may only pass for waves.
     """
-    least = as_filtered(calm.fitter, best).bic
-    if waves.bic > least - NAMING_MARGIN:
-        return None
-    search, found, told = _searched(calm, waves, least)
+    search, found, told = _searched(calm, waves, as_filtered(calm.fitter, calm.root).bic)
     return Explained(found, search, leftover(calm.fitter, told.fitted), told)
+
+
+def against(plain: Explained, waves: Explanation, best: Explanation) -> Explained | None:
+    """What was found among plain waves, where these alone explain more than the best without them."""
+    least = as_filtered(plain.search.fitter, best).bic
+    if plain.waves is None or waves.bic > least - NAMING_MARGIN:
+        return None
+    return plain._replace(waves=replace(plain.waves, delta_bic=least - waves.bic))
 
 
 def explains_more(plain: Explained, best: Explanation) -> bool:

@@ -17,6 +17,7 @@ from host.diagnosis.seas import (
     Explained,
     Waves,
     _of_the_waves,
+    against,
     among_waves,
     explains_more,
     in_plain_waves,
@@ -91,17 +92,19 @@ def test_what_only_passes_for_waves_is_none(monkeypatch: pytest.MonkeyPatch) -> 
     with Workers(fitter, 1) as workers:
         calm = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
         better = replace(fitter.root, bic=waves.bic)
-        assert in_plain_waves(calm, better, waves) is None  # what acts without waves explains as much
         monkeypatch.setattr(Search, "run", lambda _, also: also[0])
-        plain = in_plain_waves(calm, fitter.root, waves)
-        assert plain is not None
+        plain = in_plain_waves(calm, waves)
         assert plain.left.is_nothing
+        assert against(plain, waves, better) is None  # what acts without waves explains as much
+        told = against(plain, waves, fitter.root)
+        assert told is not None
+        assert told.waves is not None
+        assert told.waves.delta_bic == pytest.approx(fitter.root.bic - waves.bic)
         assert explains_more(plain, fitter.root)
         assert not explains_more(plain, better)
         coloured = replace(leftover(fitter, waves), is_coloured=True)
         monkeypatch.setattr("host.diagnosis.seas.leftover", lambda *_: coloured)
-        doubtful = in_plain_waves(calm, fitter.root, waves)
-        assert doubtful is not None
+        doubtful = in_plain_waves(calm, waves)
         assert not doubtful.left.is_nothing  # something else is left among them
     assert plain_waves(Fitter([hidden_dive(duration=60.0)])) is None
 
