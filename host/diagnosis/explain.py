@@ -10,6 +10,7 @@ from host.diagnosis.leftover import leftover
 from host.diagnosis.margins import LARGEST_SET, LITTLE
 from host.diagnosis.plane_choice import Way
 from host.diagnosis.pruning import leanest
+from host.diagnosis.rarity import told_by_the_usual
 from host.diagnosis.search import Search
 from host.diagnosis.seas import (
     Explained,
@@ -56,8 +57,10 @@ def explain(
     if plain is not None and plain.left.is_nothing and not left.is_nothing:
         return plain
     if best.names or not left.is_nothing:
-        best = with_unknown(search, best)
-        left = leftover(fitter, best)
+        grown = with_unknown(search, best)
+        if grown is not best and not unknown_in(grown):
+            grown = told_by_the_usual(search, grown)  # what joined late has not been asked yet
+        best, left = grown, leftover(fitter, grown)
     if may_be_sea and (unknown_in(best) or not left.is_nothing):
         calm = best
         if plain is not None and plain.left.is_nothing:

@@ -23,7 +23,7 @@ from host.diagnosis.whole_vehicle import OFF_CENTRE, is_real, with_all_ordinary
 if TYPE_CHECKING:
     from host.diagnosis.search import Search
 
-CLEARLY = 20.0  # of BIC, by which a set without it may be worse: more, and no fit of the usual does its work
+CLEARLY = 20.0  # of BIC, by which a rare effect must pay; as much worse a set of usual ones may be
 SLIGHT = 0.01  # of BIC a sample: of the noise's variance
 
 
@@ -52,9 +52,12 @@ def told_by_the_usual(search: "Search", best: Explanation) -> Explanation:
 
 
 def _pays(search: "Search", name: str, whole: Explanation, other: Explanation) -> bool:
-    """Whether all that every vehicle has is clearly less likely without the effect."""
+    """Whether all that every vehicle has is clearly less likely without the effect.
+
+    By more than names need elsewhere: the forms of the usual effects are not exact.
+    """
     charge = log(whole.fit.samples) * search.fitter.free_parameters(frozenset({name}))
-    return 2.0 * (whole.fit.log_likelihood - other.fit.log_likelihood) > charge + margin(whole)
+    return 2.0 * (whole.fit.log_likelihood - other.fit.log_likelihood) > charge + max(CLEARLY, margin(whole))
 
 
 def _without_the_slight(search: "Search", best: Explanation) -> Explanation:
