@@ -36,10 +36,12 @@ def verdict_on(
 
     waves  by how much of BIC those it was found among, if any, are likelier than no waves
     """
-    if left.is_nothing and not best.names - minute_in(best):
+    if left.is_nothing and not best.names:
         return "no_mismatch"
     # Random forces spoil a free run whatever is known: it need not be better for knowing more.
     worst = max(before.chi2 * (SEA_DOUBT if best.fit.has_process_noise else 1.0), WORSE)
+    if left.is_nothing and after.chi2 < WORSE and best.names == minute_in(best):
+        return "no_mismatch"
     if left.is_nothing and after.chi2 < worst and not unknown_in(best):
         return "partly_explained" if _doubt(best, waves) else "explained"
     return "partly_explained" if known_in(best) and after.chi2 < 0.7 * before.chi2 else "unexplained"

@@ -10,8 +10,10 @@ from host.catalogue import structure_of
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.leftover import Leftover
 from host.diagnosis.minute import LEAST_ANGLE, minute_in
-from host.diagnosis.verdict import Verdict
+from host.diagnosis.scoring import Misfit
+from host.diagnosis.verdict import Verdict, verdict_on
 
 CLIMB, TURN = abs(BASE["a1"]) * BASE["u0"], abs(BASE["b2"])  # m/s^2 and rad/s^2 a radian
 
@@ -48,3 +50,16 @@ def test_a_minute_moment_is_modelled_and_not_named(moment: float, verdict: Verdi
     assert found.extended.names & {"trim_moment", "rudder_offset", "net_buoyancy"}
     assert bool(found.effects) is (verdict == "explained")
     assert ("too little to be named" in found.remaining) is (verdict == "no_mismatch")
+
+
+@pytest.mark.parametrize(("after", "verdict"), [(1.0, "no_mismatch"), (3.0, "unexplained")])
+def test_a_minute_offset_does_not_excuse_what_was_held_out(after: float, verdict: Verdict) -> None:
+    base, structure = Fitter([hidden_dive(duration=20.0)]).base, structure_of(("rudder_offset",))
+    own = BASE | {"heave_offset": 0.0, "pitch_offset": 0.0, "rudder_zero": 1e-5}
+    fit = replace(base.fit, structure=structure, parameters=np.array([own[n] for n in structure.names]))
+    left = Leftover(
+        is_coloured=False, is_local=False, is_by_speed=False, is_no_sea=False, is_above_floor=False,
+        smooth_gain=0.0, is_smooth=False,
+    )  # fmt: skip
+    off = Misfit(depth_rmse_m=0.0, pitch_rmse_rad=0.0, chi2_depth=after, chi2_pitch=after)
+    assert verdict_on(Explanation(frozenset({"rudder_offset"}), fit, 0.0), left, off, off) == verdict
