@@ -262,7 +262,7 @@ def _unnamed(best: Explanation, waves: Waves | None) -> list[str]:
     """Of offsets in the model that are not named."""
     angle, theirs = np.rad2deg(LEAST_ANGLE), waves.theirs if waves else frozenset()
     reasons = {
-        f"worth less than {angle:.2f} deg of plane: too little to be named": minute_in(best),
+        f"worth less than {angle:.1g} deg of plane: too little to be named": minute_in(best),
         "no larger than what waves themselves do on the mean: it is not named": theirs,
     }
     return [

@@ -10,7 +10,7 @@ import numpy as np
 from host.catalogue.kin import OFFSETS, as_trim
 from host.diagnosis.explanation import Explanation, Names
 
-LEAST_ANGLE = 2e-4  # rad, a hundredth of a degree: of plane, or of the climb that is due to a force
+LEAST_ANGLE = 5e-5  # rad, 0.003 deg: of plane, or of the climb that is due to a force
 
 
 def minute_in(explanation: Explanation) -> Names:
