@@ -263,7 +263,7 @@ def _unnamed(best: Explanation, waves: Waves | None) -> list[str]:
     angle, theirs = np.rad2deg(LEAST_ANGLE), waves.theirs if waves else frozenset()
     reasons = {
         f"worth less than {angle:.1g} deg of plane: too little to be named": minute_in(best),
-        "no larger than what waves themselves do on the mean: it is not named": theirs,
+        "no larger than what waves themselves do on the mean: it is not named": theirs - minute_in(best),
     }
     return [
         f"The model holds a {' and '.join(name.replace('_', ' ') for name in sorted(names))} {reason}."

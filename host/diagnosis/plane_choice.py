@@ -103,7 +103,7 @@ def is_likelier(
 def _is_whole_likelier(fitter: Fitter, search: Search, best: Explanation) -> bool:
     """Whether the vehicle is likelier so with all that it has: among that is what the wrong way lacks."""
     other = with_all_ordinary(fitter, fitter.reduced(best, best.names))
-    return other.bic < with_all_ordinary(search.fitter, best).bic - NAMING_MARGIN
+    return other.bic < search.completion(best).bic - NAMING_MARGIN
 
 
 def _leaner(explanation: Explanation) -> list[Names]:

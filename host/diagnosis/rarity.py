@@ -18,7 +18,7 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import margin
 from host.diagnosis.pruning import pruned
-from host.diagnosis.whole_vehicle import OFF_CENTRE, is_real, with_all_ordinary
+from host.diagnosis.whole_vehicle import OFF_CENTRE, is_real
 
 if TYPE_CHECKING:
     from host.diagnosis.search import Search
@@ -36,12 +36,12 @@ def told_by_the_usual(search: "Search", best: Explanation) -> Explanation:
     if not rare:
         return best
     search.on_progress("what every vehicle has in place of " + " and ".join(rare))
-    (whole,) = search.workers.results([(with_all_ordinary, (best,))])
+    whole = search.completion(best)
     for name in rare:
         if name not in best.names:
             continue  # gone with another
         fewer = search.without(best, name)
-        (other,) = search.workers.results([(with_all_ordinary, (fewer,))])
+        other = search.completion(fewer)
         if _pays(search, name, whole, other):
             continue
         lean = min(fewer, pruned(search, search.remember(other)), key=lambda e: e.bic)

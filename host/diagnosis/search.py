@@ -30,7 +30,7 @@ from host.diagnosis.prospects import gain
 from host.diagnosis.pruning import pruned
 from host.diagnosis.rarity import told_by_the_usual
 from host.diagnosis.together import completed, together
-from host.diagnosis.whole_vehicle import whole
+from host.diagnosis.whole_vehicle import whole, with_all_ordinary
 from host.diagnosis.workers import Task, Workers
 from host.recording import Array
 
@@ -56,8 +56,8 @@ class Search:
     alone  each effect alone, where these were fitted before
     rivals  sets that were fitted in an exchange
     joint   sets with all that every vehicle has
-    is_for_few  not for all that every vehicle has at once: something else explains the recordings
     steered  what a continuation found likeliest while forces still steered the state
+    is_for_few  not for all that every vehicle has at once: something else explains the recordings
     """
 
     fitter: Fitter
@@ -74,6 +74,7 @@ class Search:
     is_for_few: bool = False
     _shrunk: dict[Names, set[Names]] = field(default_factory=dict)  # those fitted from larger sets: which
     _polished: set[Names] = field(default_factory=set)  # those of them fitted to the end
+    _completions: dict[tuple[Names, float], Explanation] = field(default_factory=dict)  # by set and BIC
 
     def run(self, also: list[Explanation] | None = None) -> Explanation:
         """The best explanation all of whose members pay for themselves; `also` are sets worth a look."""
@@ -137,6 +138,14 @@ class Search:
         (found,) = self.workers.results([(Fitter.shrunk, (best, *members))])
         self.polish([self.remember(found).names])
         return self.tried[found.names]
+
+    def completion(self, explanation: Explanation) -> Explanation:
+        """The set with all that every vehicle has; see host.diagnosis.whole_vehicle."""
+        key = explanation.names, explanation.bic
+        if key not in self._completions:
+            (found,) = self.workers.results([(with_all_ordinary, (explanation,))])
+            self._completions[key] = found.lean()
+        return self._completions[key]
 
     def gain_alone(self, name: str) -> float:
         """What the effect alone takes off the BIC: of the root, of the base if an offset; -inf if untried."""

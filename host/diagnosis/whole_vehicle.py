@@ -46,7 +46,7 @@ def whole(search: "Search", best: Explanation) -> Explanation:
         return best
     search.on_progress("all that every vehicle has")
     for _ in range(MOST_ROUNDS):
-        (found,) = search.workers.results([(with_all_ordinary, (best,))])
+        found = search.completion(best)
         gain = 2.0 * (found.fit.log_likelihood - best.fit.log_likelihood)
         if gain < log(best.fit.samples) + margin(best):
             break  # none of them could pay

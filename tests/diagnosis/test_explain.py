@@ -1,12 +1,15 @@
-"""With what a diagnosis begins where a similar vehicle is known."""
+"""In which order a diagnosis asks: with what it begins, waves that are plain to see, what joined late."""
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
+from host.diagnosis import explain as module
 from host.diagnosis.explain import _alike
 from host.diagnosis.margins import LARGEST_SET, LITTLE
+from host.diagnosis.search import Search
+from host.diagnosis.seas import Explained
 
 MANY = frozenset(f"effect {number}" for number in range(LARGEST_SET + 1))
 
@@ -36,3 +39,61 @@ def test_a_set_of_many_effects_that_leaves_little_is_begun_with() -> None:
 )
 def test_else_the_search_begins_anew(like: Any, excess: float) -> None:
     assert _alike(fitter_that_leaves(excess), like) == []
+
+
+NOTHING, MUCH_LEFT = (SimpleNamespace(is_nothing=one, is_by_speed=False) for one in (True, False))
+ORDINARY_SET = explanation(frozenset({"munk_moment", "actuator_lag"}))
+RARE_SET = explanation(frozenset({"munk_moment", "actuator_delay"}))
+IN_WAVES = Explained(cast("Any", explanation(frozenset())), cast("Any", None), cast("Any", NOTHING), None)
+
+
+def explained(monkeypatch: pytest.MonkeyPatch, found: Any, *, left: Any = NOTHING, waves: Any = None) -> Any:
+    """What `explain` makes of a search that finds this, and whether that was for few effects only."""
+    was_for_few = []
+
+    def run(search: Search, _: Any) -> Any:
+        was_for_few.append(search.is_for_few)
+        return found
+
+    monkeypatch.setattr(Search, "run", run)
+    monkeypatch.setattr(module, "leftover", lambda *_: left)
+    monkeypatch.setattr(module, "led_astray", lambda *_: None)
+    monkeypatch.setattr(module, "unknown_in", lambda one: [n for n in one.names if n.startswith("unknown_")])
+    monkeypatch.setattr(module, "leanest", lambda _, best: best)
+    fitter: Any = SimpleNamespace(base=None, root=None)
+    way: Any = SimpleNamespace(waves=waves, alone=())
+    return module.explain(fitter, cast("Any", None), lambda _: None, way), was_for_few
+
+
+@pytest.mark.parametrize(("form", "asked"), [((), True), (("unknown_force_w_q",), False)])
+def test_a_rare_effect_that_joins_late_is_asked_unless_a_form_competes(
+    form: tuple[str, ...], asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    late = explanation(RARE_SET.names | {*form})
+    monkeypatch.setattr(module, "with_unknown", lambda *_: late)
+    monkeypatch.setattr(module, "told_by_the_usual", lambda *_: ORDINARY_SET)
+    monkeypatch.setattr(module, "in_a_sea", lambda search, best: (search, best))
+    monkeypatch.setattr(module, "among_waves", lambda search, best, _: (search, best, None))
+    answer, _ = explained(monkeypatch, explanation(frozenset({"munk_moment"})))
+    assert answer.best is (ORDINARY_SET if asked else late)
+
+
+@pytest.mark.parametrize(("left", "is_in_waves"), [(NOTHING, False), (MUCH_LEFT, True)])
+def test_waves_that_are_plain_to_see_are_asked_first(
+    left: Any, is_in_waves: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "in_plain_waves", lambda *_: IN_WAVES)
+    monkeypatch.setattr(module, "against", lambda plain, *_: plain)
+    monkeypatch.setattr(module, "with_unknown", lambda _, best: best)
+    answer, was_for_few = explained(monkeypatch, ORDINARY_SET, left=left, waves=explanation(frozenset()))
+    assert was_for_few == [True]
+    assert (answer is IN_WAVES) is is_in_waves
+
+
+@pytest.mark.parametrize("is_for_few", [False, True])
+def test_what_a_few_explain_needs_no_dozen(is_for_few: bool) -> None:
+    one: Any = explanation(frozenset())
+    search = Search(
+        fitter_that_leaves(3.0), cast("Any", None), lambda _: None, one, one, is_for_few=is_for_few
+    )
+    assert search._needs_many(one, 2) is not is_for_few
