@@ -12,13 +12,8 @@ ORDER = 4  # differences; a smooth motion vanishes in them, white noise grows by
 
 
 def noise_floor(recordings: list[Recording]) -> Array:
-    """Variances (2,) of the white noise in pitch (rad^2) and depth (m^2).
-
-    The median magnitude of fourth differences, over that of unit white noise: plane steps are rare enough
-    not to move a median. Rounded readings have few differences, among which a median says little: they are
-    dithered first. Rounding is the least noise of a channel.
-    """
-    return np.array([_channel([r.pitch for r in recordings]), _channel([r.depth for r in recordings])])
+    """Variances (2,) of the white noise in pitch (rad^2) and depth (m^2)."""
+    return np.array([white_noise([r.pitch for r in recordings]), white_noise([r.depth for r in recordings])])
 
 
 def resolution(recordings: list[Recording]) -> Array:
@@ -33,7 +28,13 @@ def is_quantised(recordings: list[Recording]) -> NDArray[np.bool_]:
     return np.asarray(steps**2 / 12.0 > RULES * noise_floor(recordings))
 
 
-def _channel(pieces: list[Array]) -> float:
+def white_noise(pieces: list[Array]) -> float:
+    """Variance of the white noise in a channel's pieces (N,), NaN where it was not measured.
+
+    The median magnitude of fourth differences, over that of unit white noise: plane steps are rare enough
+    not to move a median. Rounded readings have few differences, among which a median says little: they are
+    dithered first. Rounding is the least noise of a channel.
+    """
     gain = np.sqrt(sum(_binomial(ORDER, k) ** 2 for k in range(ORDER + 1)))
     step, rng = quantum(pieces), np.random.default_rng(0)
     # A channel slower than the grid has gaps at every other row: its own samples are the series.

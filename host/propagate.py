@@ -28,9 +28,9 @@ LONGEST_DELAY = 1.0  # s; how far back commands are looked up
 class Inputs:
     """What drives the equations over one recording, and what was measured. N rows.
 
-    drive     (6 + lags, N) commanded rudder rad, speed m/s, 1 where the speed is known, interval to the next
-              row s, time s, surge acceleration m/s^2; then, where the structure looks back, earlier
-              commands, newest first
+    drive     (6 + lags, N) commanded rudder rad, mean speed to the next row m/s, 1 where the speed is known,
+              interval to the next row s, time s, surge acceleration m/s^2; then, where the structure looks
+              back, earlier commands, newest first
     measured  (2, N) pitch rad and depth m, 0 where missing
     present   (2, N) 1 where measured, else 0
     steps     (2,) of the rounding of pitch and depth where it rules, else 0
@@ -59,6 +59,7 @@ def inputs_of(
     known = np.full(intervals.size, float(recording.has_speed))
     speed = smoothed_speed(recording.speed).speed if recording.has_speed else np.zeros(intervals.size)
     surge = np.append(np.diff(speed) / intervals[:-1], 0.0)
+    speed = np.append((speed[:-1] + speed[1:]) / 2.0, speed[-1:])  # from row to row it changes evenly
     lags = int(np.ceil(LONGEST_DELAY / recording.step)) + 1 if structure.needs_lags else 0
     earlier = [
         np.concatenate([np.full(min(lag, intervals.size), recording.rudder[0]), recording.rudder])[

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.fft import dct, idct
 from scipy.optimize import minimize_scalar
 
+from host.noise_floor import white_noise
 from host.recording import Array
 
 
@@ -38,30 +39,29 @@ def smoothed_speed(measured: Array) -> SmoothedSpeed:
 
 
 def _smoothed(measured: Array) -> SmoothedSpeed:
-    """Most likely speed (N,) when it wanders at random (variance q a row) under white noise (variance r).
+    """Most likely speed (N,) when its slope wanders at random (variance q a row), under white noise of r.
 
-    In cosine transforms both are independent: y_k ~ r + q / d_k, d_k = 2 - 2 cos(pi k / N), and the mean
-    square optimum is y_k / (1 + r d_k / q). The ratio c = r / q is the likeliest; of a constant speed the
-    mean is left. The variance of the error is r / (1 + c d_k): that of a process with the decay a for which
-    a / (1 - a)^2 = c, and the variance r (1 - a) / (1 + a).
+    In cosine transforms both are independent: y_k ~ r + q / d_k^2, d_k = 2 - 2 cos(pi k / N), and the mean
+    square optimum is y_k / (1 + r d_k^2 / q). The noise is that of the sensor's fast differences: thrust and
+    plane change by steps, of which the likeliest pair r, q would make a speed without noise. The likeliest q
+    given r is found; of a constant speed the mean is left. The error has the density r where it is slow, and
+    the variance v left over all k: that of a process with the decay a for which v = r (1 - a) / (1 + a).
     """
     rows = measured.size
     if rows < 8 or np.ptp(measured) == 0.0:
         return SmoothedSpeed(measured, 0.0, 0.0)
+    noise = white_noise([measured])
     transform = dct(measured, norm="ortho")
-    power, stiffness = transform[1:] ** 2, 2.0 - 2.0 * np.cos(np.pi * np.arange(1, rows) / rows)
-
-    def noise(log_ratio: float) -> float:
-        return float(np.mean(power / (1.0 + np.exp(-log_ratio) / stiffness)))
+    stiffness = (2.0 - 2.0 * np.cos(np.pi * np.arange(1, rows) / rows)) ** 2
+    power = transform[1:] ** 2 / noise
 
     def cost(log_ratio: float) -> float:
         shape = 1.0 + np.exp(-log_ratio) / stiffness
-        return float((rows - 1) * np.log(noise(log_ratio)) + np.sum(np.log(shape)))
+        return float(np.sum(power / shape + np.log(shape)))
 
     # From hardly any noise to hardly any change over the whole recording.
-    found = minimize_scalar(cost, bounds=(-25.0, 2.0 * np.log(rows) + 7.0), method="bounded")
-    ratio = np.exp(found.x)
-    kept = 1.0 / (1.0 + ratio * stiffness)
+    found = minimize_scalar(cost, bounds=(-25.0, 4.0 * np.log(rows) + 7.0), method="bounded")
+    kept = 1.0 / (1.0 + np.exp(found.x) * stiffness)
     speed = np.asarray(idct(np.concatenate([transform[:1], kept * transform[1:]]), norm="ortho"))
-    decay = float(2.0 * ratio / (2.0 * ratio + 1.0 + np.sqrt(4.0 * ratio + 1.0)))
-    return SmoothedSpeed(speed, noise(found.x) * (1.0 - decay) / (1.0 + decay), decay)
+    left = float(np.mean(kept))
+    return SmoothedSpeed(speed, noise * left, (1.0 - left) / (1.0 + left))

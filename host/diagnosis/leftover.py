@@ -76,7 +76,7 @@ def leftover(fitter: Fitter, best: Explanation) -> Leftover:
     doubt = SEA_DOUBT if fit.has_process_noise else 1.0
     is_sea = fit.waves.any() or _heave_by_sea(fit) >= LEAST_SEA
     return Leftover(
-        is_coloured=not all(is_white(e, 20, SIGNIFICANCE, slack) and is_even(e) for e in innovations),
+        is_coloured=not all(is_white(e, 20, SIGNIFICANCE, slack) and is_even(e, slack) for e in innovations),
         is_local=_is_local(fitter.recordings, even),
         is_by_speed=is_by_speed,
         is_no_sea=bool(fit.has_process_noise and not is_sea and not is_by_speed),

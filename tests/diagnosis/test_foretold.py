@@ -12,7 +12,7 @@ from tests.diagnosis.test_unstable_hull import NOISE, flown
 
 
 def test_an_unstable_hull_is_foretold_where_no_free_run_follows_it() -> None:
-    fitter, best = flown(0.06)
+    fitter, best = flown(0.12)
     fit = replace(best.fit, noise=np.array([*fitter.floor, 1e-6, 1e-4]))
     known = replace(best, fit=fit)
     spans = divide(fitter.recordings)

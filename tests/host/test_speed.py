@@ -27,14 +27,27 @@ def test_a_speed_without_noise_is_kept() -> None:
 
 def test_the_error_that_is_left_is_told() -> None:
     rng = np.random.default_rng(3)
-    truth = 1.5 + np.cumsum(0.004 * rng.standard_normal(4000))
-    errors = [smoothed_speed(truth + 0.05 * rng.standard_normal(4000)).speed - truth for _ in range(20)]
-    told = smoothed_speed(truth + 0.05 * rng.standard_normal(4000))
-    each = np.array(errors)
-    assert told.variance == pytest.approx(float(np.mean(each**2)), rel=0.2)
-    for lag in (1, 10):
-        measured = float(np.mean(each[:, lag:] * each[:, :-lag]) / np.mean(each**2))
-        assert told.decay**lag == pytest.approx(measured, abs=0.1)
+    truth = 1.5 + np.cumsum(np.cumsum(3e-5 * rng.standard_normal(4000)))
+    errors = [smoothed_speed(truth + 0.002 * rng.standard_normal(4000)).speed - truth for _ in range(20)]
+    told = smoothed_speed(truth + 0.002 * rng.standard_normal(4000))
+    assert told.variance == pytest.approx(float(np.mean(np.square(errors))), rel=0.2)
+    slow = np.array(errors).reshape((20, -1, 200)).mean(axis=2)  # what moves the depth
+    density = told.variance * (1.0 + told.decay) / (1.0 - told.decay)
+    assert density / 200.0 == pytest.approx(float(np.mean(slow**2)), rel=0.4)
+
+
+def test_jumps_are_no_reason_to_believe_a_noisy_sensor() -> None:
+    """As at every step of the plane: the slope jumps, and the likeliest noise beside would be none."""
+    rng = np.random.default_rng(5)
+    steps = np.repeat(rng.uniform(-0.3, 0.3, 40), 100)
+    truth, slope = np.empty(4000), 0.1
+    truth[0] = 3.0
+    for k in range(3999):
+        truth[k + 1] = truth[k] + 0.1 * slope * (3.0 - 40.0 * steps[k] ** 2 - truth[k])
+    told = smoothed_speed(truth + 0.005 * rng.standard_normal(4000))
+    error = np.sqrt(np.mean((told.speed - truth) ** 2))
+    assert error < 0.003
+    assert np.sqrt(told.variance) == pytest.approx(error, rel=0.3)
 
 
 def test_a_slow_sensor_tells_as_much_with_empty_rows_between_its_readings() -> None:
