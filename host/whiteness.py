@@ -69,7 +69,7 @@ def is_even(innovations: Array, slack: float = 0.0) -> bool:
     """Bartlett's test on each row of (outputs, N): the power of white noise grows evenly with frequency.
 
     Kolmogorov's distance of the cumulative periodogram from a straight line, whatever the variances. A
-    correlation r_k at lag k adds 2 / pi r_k sin(omega k) / k to it; one of `slack` at a single lag is no sign.
+    correlation r_k at lag k adds 2 / pi r_k sin(omega k) / k; one of `slack` at a single lag is no sign.
     """
     for values in innovations:
         known = np.isfinite(values)
