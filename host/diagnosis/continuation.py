@@ -20,6 +20,7 @@ from host.diagnosis.first_guess import first_guess
 from host.diagnosis.margins import LITTLE, NAMING_MARGIN
 from host.diagnosis.prospects import gain, probed
 from host.diagnosis.starts import idle_values, with_other_moments
+from host.equations import NAMES
 from host.filter_error import filter_error_from
 from host.gauss_newton import Point
 from host.valleys import USUAL_SPEED, with_poles_swapped
@@ -33,14 +34,16 @@ STAGES = tuple(10.0 ** (-k / 2) for k in range(1, 17))
 """Variance of the unknown force over that of all force."""
 UNDECIDED = 4  # stages, through which sets with an effect that gains at the first are followed side by side
 FOLLOWED = 2  # sets, or ends of one set, from then on: that one sits in a side valley shows late
-SAME_END = 3.0  # of BIC between two fits of a set
+SAME_END, SAME_SPEED = 3.0, 0.05  # of BIC, and of the speed, between two fits of a set
 CLEARLY = 50.0  # of BIC, that each must gain by then and at the end, where nothing seems to be lacking
 PROMISING, MOST_PROMISING = 2, 3  # effects that are tried where one may join, and at the first stage
 PLACES = 2  # in which each of them begins
 SLIGHTLY = 1.05  # times the variance expected: enough for another look at the moments
 FEW_STEPS, STEPS = 10, 40  # of the parameters at one stage: many lie along a ridge, where a stage is slow
+SPEED = NAMES.index("u0")
 APPARENT = ("pitch_bias", "vertical_current")  # no constant force does the same where heave is not linear
 LOST = 2.0  # of BIC a sample, to the best stage: the last ones lead nowhere
+BEHIND = 0.1  # of BIC a sample, to the best of the same stage: it leads nowhere
 
 
 def continued(search: "Search", names: Names, most_beside: int) -> Explanation | None:
@@ -52,8 +55,10 @@ def continued(search: "Search", names: Names, most_beside: int) -> Explanation |
     followed = _with_what_is_large(search, names)
     swapped = [at for one in followed for at in with_poles_swapped(_at(one))]
     for share in STAGES[UNDECIDED:]:
-        others = _steered(search, [_forced(fitter, at, share) for at in swapped], STEPS)
+        others = _steered(search, [_forced(fitter, at, share) for at in swapped])
+        others = _under(search, [one for one in others if _is_near(one, followed[0], BEHIND)], share, STEPS)
         followed = _distinct([*_under(search, followed, share, STEPS), *others])[:FOLLOWED]
+        followed = [one for one in followed if _is_near(one, followed[0], BEHIND)]
         followed, swapped = _moved(search, followed), []
         while followed and _lacks(followed[0], LITTLE) and len(followed[0].names - common) < most_beside:
             larger = _best_of_each(_larger(search, followed[0], PROMISING))[:1]
@@ -63,7 +68,7 @@ def continued(search: "Search", names: Names, most_beside: int) -> Explanation |
         if not followed:
             return None
         likeliest = _kept(search, followed)
-        if followed[0].bic > likeliest.bic + LOST * likeliest.fit.samples:
+        if not _is_near(followed[0], likeliest, LOST):
             break
     best = min(followed, key=_charged)
     return fitter.explained(best.names, fitter.fitted([_forced(fitter, _at(best), 0.0)]))
@@ -84,16 +89,17 @@ def _with_what_is_large(search: "Search", names: Names) -> list[Explanation]:
     """
     fitter = search.fitter
     begun = [_begun(fitter, names, speed) for speed in _speeds(fitter)]
-    plain = _steered(search, [_forced(fitter, point, STAGES[0]) for point in begun])
-    along = _steered(search, [at for one in plain for at in _starts(search, one, ALONG_THE_HULL)])
+    plain = _distinct(_steered(search, [_forced(fitter, point, STAGES[0]) for point in begun]))
+    along = _distinct(_steered(search, [at for one in plain for at in _starts(search, one, ALONG_THE_HULL)]))
     followed = [*plain, *along]
     for parents in (plain, _best_of_each(along)):
         larger = [end for parent in parents for end in _larger(search, parent, MOST_PROMISING)]
         kept = {one.names for one in _best_of_each(larger)[:MOST_PROMISING]}
         followed += _distinct([one for one in larger if one.names in kept])
     for share in STAGES[1:UNDECIDED]:
-        followed = _distinct(_under(search, followed, share))
-    return sorted(followed, key=_charged)[:FOLLOWED]
+        followed = sorted(_distinct(_under(search, followed, share)), key=_charged)
+        followed = followed[: max(FOLLOWED, len(followed) // 2)]
+    return followed[:FOLLOWED]
 
 
 def _charged(one: Explanation) -> float:
@@ -137,9 +143,21 @@ def _distinct(found: list[Explanation]) -> list[Explanation]:
     """The likeliest first, each end of a set once."""
     ends: list[Explanation] = []
     for one in sorted(found, key=lambda one: one.bic):
-        if all(one.names != end.names or one.bic > end.bic + SAME_END for end in ends):
+        if not any(_is_same(one, end) for end in ends):
             ends.append(one)
     return ends
+
+
+def _is_same(one: Explanation, end: Explanation) -> bool:
+    """Whether two fits of a set are as likely, at the same speed: others may part as the forces fall."""
+    speed, there = (float(each.fit.parameters[SPEED]) for each in (one, end))
+    is_as_likely = one.bic <= end.bic + SAME_END
+    return one.names == end.names and is_as_likely and abs(speed - there) < SAME_SPEED * there
+
+
+def _is_near(one: Explanation, best: Explanation, most: float) -> bool:
+    """Whether it is less than so much of BIC a sample behind."""
+    return one.bic < best.bic + most * best.fit.samples
 
 
 def _larger(search: "Search", parent: Explanation, most: int) -> list[Explanation]:
