@@ -77,11 +77,17 @@ def place(point: Point, model: NoiseModel[P]) -> Place[P]:
 
 
 def ascend(
-    point: Point, model: NoiseModel[P], free: Mask, most_steps: int, holds_noise: bool = False
+    point: Point,
+    model: NoiseModel[P],
+    free: Mask,
+    most_steps: int,
+    holds_noise: bool = False,
+    holds_gain: bool = False,
 ) -> tuple[Place[P], int, bool]:
     """Climbs from a point; gives where it ended, after how many steps, and whether it had converged.
 
     holds_noise  whether the noise levels stay as they are, which saves most of the work
+    holds_gain   whether no step asks how the gain moves with the parameters
     """
     here, damping, converged, used = place(point, model), FIRST_DAMPING, False, 0
     while not converged and used < most_steps and np.isfinite(here.likelihood):
@@ -89,7 +95,8 @@ def ascend(
         step = GaussNewton(model.whitened(here.point, here.passes), here.point, free)
         scoring = None if holds_noise else _Scoring(here, model)
         there, damping = _uphill(here, model, step, scoring, damping)
-        if there.likelihood - here.likelihood <= SETTLED and step.promise() > FALSE_PROMISE:
+        is_stuck = not there.likelihood - here.likelihood > SETTLED
+        if is_stuck and not holds_gain and step.promise() > FALSE_PROMISE:
             there, damping = _uphill(here, model, _scored(here, model, step), scoring, FIRST_DAMPING)
         gained = there.likelihood - here.likelihood
         converged = not gained > SETTLED

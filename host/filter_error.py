@@ -48,11 +48,16 @@ def filter_error(start: Fit, inputs: list[Inputs], most_steps: int = 40) -> Fit:
 
 
 def filter_error_from(
-    point: Point, inputs: list[Inputs], free: Mask, most_steps: int = 40, holds_noise: bool = False
+    point: Point,
+    inputs: list[Inputs],
+    free: Mask,
+    most_steps: int = 40,
+    holds_noise: bool = False,
+    holds_gain: bool = False,
 ) -> Fit:
     """The same from any point with forces; or the parameters alone, under these very forces."""
     model = RandomForces(inputs)
-    end, used, converged = ascend(point, model, free, most_steps, holds_noise)
+    end, used, converged = ascend(point, model, free, most_steps, holds_noise, holds_gain)
     if not np.isfinite(end.likelihood):
         return run_away(point, inputs, free)
     white = model.whitened(end.point, end.passes)
