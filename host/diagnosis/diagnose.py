@@ -182,15 +182,15 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
     model = best if waves is None else waves.model
     on_progress("held-out check")
     horizon = _horizon(left)
-    before, after = (misfit(one, spans, floor, horizon) for one in (search.base, model))
+    # The very waves that were met are chance, and the regular one in their place may come out of step.
+    foretelling = best if waves is None else waves.fitted
+    before, after = (misfit(one, spans, floor, horizon) for one in (search.base, foretelling))
     unnamed = minute_in(best) | (frozenset() if waves is None else waves.theirs)
     effects = [one for one in _named(search, best, spans, floor, after, horizon) if one.name not in unnamed]
     if waves is not None and WAVES not in best.names:
         effects.append(NamedEffect(name=WAVES, delta_bic=waves.delta_bic))
     effects.sort(key=lambda effect: -effect.delta_bic)
-    # The very waves that were met are chance, and the regular one in their place may come out of step.
-    without_it = after if waves is None else misfit(waves.fitted, spans, floor)
-    verdict = verdict_on(model, left, before, without_it, evidence(waves))
+    verdict = verdict_on(model, left, before, after, evidence(waves))
     return Judged(before, after, effects, verdict, _slots(search, best, effects, verdict))
 
 

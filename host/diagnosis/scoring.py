@@ -7,9 +7,11 @@ import numpy as np
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.foretold import foretold_errors
 from host.diagnosis.spans import Spans
+from host.kalman import kalman_pass
 from host.predict import SETTLING_SPAN, estimate_initial_state
 from host.propagate import Run, free_run, inputs_of
 from host.recording import Array, Recording
+from host.sensitivities import steered_run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,14 +57,14 @@ def misfit(explanation: Explanation, spans: Spans, floor: Array, horizon: float 
     """Scores a fit to the teaching recordings on what it has not seen, against the noise floor (2,).
 
     The free run of the fit passes through the stretches that were held out, so that lags and the speed arrive
-    there as they are. Where random forces act it would stray from any truth: there it begins anew with each
-    stretch, and so it does where recordings judge as a whole.
+    there as they are. Where random forces act it would stray from any truth: there a Kalman filter follows
+    what was taught, and runs freely over what was held out. Where recordings judge as a whole it begins anew.
 
     horizon  s over which each stretch is foretold instead
     """
     if horizon is not None:
         errors = [foretold_errors(explanation, one, horizon) for one in spans.judging or spans.teaching]
-    elif spans.unseen and not explanation.fit.has_process_noise:
+    elif spans.unseen:
         errors = _errors_passing(explanation, spans)
     else:
         errors = [free_run_errors(explanation, piece, np.inf) for piece in spans.judging or spans.teaching]
@@ -80,8 +82,13 @@ def _errors_passing(explanation: Explanation, spans: Spans) -> list[Array]:
     fit = explanation.fit
     errors = []
     for run, unseen, initial in zip(spans.teaching, spans.unseen, fit.initial, strict=True):
+        inputs = inputs_of(run, fit.structure)
         with np.errstate(over="ignore", invalid="ignore"):
-            passed = free_run(fit.parameters, initial, inputs_of(run, fit.structure))
+            if fit.has_process_noise:
+                gains = kalman_pass(fit.parameters, initial, fit.noise, inputs).gains
+                passed = steered_run(fit.parameters, initial, inputs, gains)
+            else:
+                passed = free_run(fit.parameters, initial, inputs)
         # A run that leaves the numbers is as far off as can be, not only as far as it can be followed.
         errors.append(np.vstack([unseen.pitch, unseen.depth]) - _known(passed, np.inf))
     return errors
