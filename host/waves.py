@@ -138,10 +138,11 @@ def in_waves_from(
     """
     model, wider = _among(point, inputs)
     wider_free = np.concatenate([free, np.zeros(len(SHAPE), dtype=bool)])
-    best, used, converged = ascend(wider, model, wider_free, most_steps, holds_noise)
+    # Waves excuse much: how the gain moves with the parameters counts for little while sets are compared.
+    best, used, converged = ascend(wider, model, wider_free, most_steps, holds_noise, holds_gain=holds_noise)
     if most_steps > FIRST_STEPS and not holds_noise:
         starts = with_usual_heave(best.point)
-        ends = [ascend(start, model, wider_free, FIRST_STEPS, holds_noise=True)[0] for start in starts]
+        ends = [ascend(one, model, wider_free, FIRST_STEPS, True, True)[0] for one in starts]
         other = max(ends, key=lambda end: end.likelihood)
         if other.likelihood > best.likelihood - NEAR:
             other, more, has_settled = ascend(other.point, model, wider_free, most_steps)

@@ -198,9 +198,8 @@ def _steered(search: "Search", points: list[Point], steps: int = FEW_STEPS) -> l
 def _climbed(fitter: "Fitter", point: Point, steps: int) -> Explanation:
     names = frozenset(effect.name for effect in point.structure.effects)
     inputs = fitter.inputs(names, for_filter=True)
-    # Large forces excuse much: how the gain moves counts once few are left.
-    is_early = steps == FEW_STEPS
-    fit = filter_error_from(point, inputs, fitter.free(names), steps, holds_noise=True, holds_gain=is_early)
+    holds_gain = not fitter.are_slight(point.noise)
+    fit = filter_error_from(point, inputs, fitter.free(names), steps, True, holds_gain)
     return fitter.explained(names, fit)
 
 

@@ -42,6 +42,7 @@ EXACT, SETTLED = 1e-3, 0.005  # of a log-likelihood, that an iteration of a poli
 NOT_THERE = 1.2  # times the sensor noise that the set left elsewhere: it has ended in another valley
 HOPELESS = 0.1  # of a log-likelihood per sample: a few iterations hardly lead to more
 MADE_UP_FOR = 20.0  # of a log-likelihood, by fewer parameters or more usual ones
+SLIGHT = 2e-3  # of the variance of all force: 4 % of it, about as much as any model is off
 ROUGHLY = 1.0  # of a log-likelihood: a set does at least as well as with one member less
 
 
@@ -275,6 +276,13 @@ class Fitter:
         names = frozenset(effect.name for effect in start.structure.effects)
         return output_error(start, self.inputs(names), self.free(names), tolerance=tolerance)
 
+    def are_slight(self, noise: Array) -> bool:
+        """Whether random forces of these levels (4,) leave no stable hull far away.
+
+        Larger ones excuse so much that how the filter's gain moves with the parameters hardly counts.
+        """
+        return bool((noise[2:4] < SLIGHT * np.square(self.accelerations)).all())
+
     def _under_forces(self, start: Point, holds_noise: bool) -> Fit:
         """While sets are compared, forces stay as they were first found, and waves to the end.
 
@@ -284,7 +292,8 @@ class Fitter:
         inputs, free = self.inputs(names, for_filter=True), self.free(names)
         if start.noise.size > 4:
             return in_waves_from(start, inputs, free, holds_noise=True)
-        return filter_error_from(start, inputs, free, holds_noise=holds_noise)
+        holds_gain = not self.are_slight(start.noise)
+        return filter_error_from(start, inputs, free, holds_noise=holds_noise, holds_gain=holds_gain)
 
 
 def first_known(values: Array) -> float:

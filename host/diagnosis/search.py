@@ -13,8 +13,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from math import inf
 
-import numpy as np
-
 from host.catalogue import named
 from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE, has_memory
@@ -41,7 +39,6 @@ PROMISING = 6
 CONTENDERS = 3  # for the place of the leading set
 MOST_ROUNDS = 4
 LOST = 10.0  # times the noise floor: forces as slight as this leave no stable hull so far away
-SLIGHT = 2e-3  # of the variance of all force: 4 % of it, about as much as any model is off
 
 Progress = Callable[[str], None]
 
@@ -305,8 +302,7 @@ class Search:
         if self.steered is None or not self.joint:
             return False
         left = min(self.fitter.excess(self.tried[names].fit) for names in self.joint)
-        forces = self.steered.fit.noise[2:] / np.square(self.fitter.accelerations)
-        return bool(left > LOST and (forces < SLIGHT).all())
+        return bool(left > LOST and self.fitter.are_slight(self.steered.fit.noise))
 
     def is_hopeless(self, best: Explanation) -> bool:
         """Whether much is left although all that every vehicle has was tried at once."""

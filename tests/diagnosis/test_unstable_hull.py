@@ -8,9 +8,9 @@ import pytest
 
 from host.catalogue import structure_of
 from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
+from host.diagnosis.fitter import SLIGHT, Fitter
 from host.diagnosis.leftover import leftover
-from host.diagnosis.search import LOST, SLIGHT, Search
+from host.diagnosis.search import LOST, Search
 from host.diagnosis.seas import Explained, again_astray, led_astray
 from host.diagnosis.speed_forces import densities
 from host.diagnosis.workers import Workers
