@@ -142,7 +142,10 @@ def in_waves_from(
     best, used, converged = ascend(wider, model, wider_free, most_steps, holds_noise, holds_gain=holds_noise)
     if most_steps > FIRST_STEPS and not holds_noise:
         starts = with_usual_heave(best.point)
-        ends = [ascend(one, model, wider_free, FIRST_STEPS, True, True)[0] for one in starts]
+        ends = [
+            ascend(one, model, wider_free, FIRST_STEPS, holds_noise=True, holds_gain=True)[0]
+            for one in starts
+        ]
         other = max(ends, key=lambda end: end.likelihood)
         if other.likelihood > best.likelihood - NEAR:
             other, more, has_settled = ascend(other.point, model, wider_free, most_steps)

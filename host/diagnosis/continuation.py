@@ -199,7 +199,8 @@ def _climbed(fitter: "Fitter", point: Point, steps: int) -> Explanation:
     names = frozenset(effect.name for effect in point.structure.effects)
     inputs = fitter.inputs(names, for_filter=True)
     holds_gain = not fitter.are_slight(point.noise)
-    fit = filter_error_from(point, inputs, fitter.free(names), steps, True, holds_gain)
+    free = fitter.free(names)
+    fit = filter_error_from(point, inputs, free, steps, holds_noise=True, holds_gain=holds_gain)
     return fitter.explained(names, fit)
 
 

@@ -6,9 +6,10 @@ import numpy as np
 
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import first_known
+from host.fit import Fit
 from host.kalman import kalman_pass
 from host.predict import SETTLING_SPAN
-from host.propagate import inputs_of
+from host.propagate import Inputs, inputs_of
 from host.recording import Array, Recording
 from host.sensitivities import steered_run
 
@@ -24,16 +25,21 @@ def foretold_errors(explanation: Explanation, recording: Recording, horizon: flo
     fit, time = explanation.fit, recording.time
     inputs = inputs_of(recording, fit.structure)
     initial = np.array([0.0, 0.0, first_known(recording.pitch), first_known(recording.depth)])
-    spread = np.zeros(len(fit.structure.states))
-    spread[: initial.size] = np.square(FIRST_SPREAD)
-    followed = kalman_pass(fit.parameters, initial, fit.noise, inputs, spread)
+    followed = following(fit, initial, inputs)
     outputs = np.full((2, time.size), np.nan)
     number = np.floor((time - time[0] - SETTLING_SPAN) / horizon)
     for ahead in (number == one for one in np.unique(number[number >= 0.0])):
         until = np.flatnonzero(ahead)[-1] + 1
-        gains = np.where(ahead, 0.0, followed.gains)[:, :until]
+        gains = np.where(ahead, 0.0, followed)[:, :until]
         cut = {name: getattr(inputs, name)[:, :until] for name in ("drive", "measured", "present")}
         run = steered_run(fit.parameters, initial, replace(inputs, **cut), gains)
         outputs[:, ahead] = run.outputs[:, ahead[:until]]
     outputs[~np.isfinite(outputs) & (number >= 0.0)] = np.inf
     return np.asarray(np.vstack([recording.pitch, recording.depth]) - outputs)
+
+
+def following(fit: Fit, initial: Array, inputs: Inputs) -> Array:
+    """Gains (2 nx, N) of a Kalman filter that begins near this state (4,), under the fit's random forces."""
+    spread = np.zeros(len(fit.structure.states))
+    spread[: initial.size] = np.square(FIRST_SPREAD)
+    return kalman_pass(fit.parameters, initial, fit.noise, inputs, spread).gains

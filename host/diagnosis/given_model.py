@@ -11,7 +11,7 @@ from host.diagnosis.diagnose import SLOTS, Diagnosis, NamedEffect
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.locate import locate
-from host.diagnosis.scoring import free_run_errors, misfit
+from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.sea_fits import levels
 from host.diagnosis.spans import divide
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
@@ -38,7 +38,7 @@ def against_model(found: Diagnosis, model: VehicleModel, name: str) -> Answer:
     base = _as_it_is(model, recordings)
     fitter = Fitter(recordings, known=found.extended)
     if found.horizon is not None:  # it is foretold from where a filter is, with forces of its own
-        base = replace(base, fit=replace(base.fit, noise=levels(fitter, base.names, base.fit)))
+        base = _among_forces(base, fitter)
     comparison = compare(fitter, found.extended, _side(model))
     known = {effect.name: effect for effect in found.effects}
     effects = [_named(one, known) for one in comparison.named("missing", "different") if one.name in BY_NAME]
@@ -51,14 +51,29 @@ def against_model(found: Diagnosis, model: VehicleModel, name: str) -> Answer:
         found,
         verdict=verdict,
         base=base,
-        # A model that knew none of the recording starts anew with each stretch.
-        base_misfit=misfit(base, replace(divide(recordings), unseen=[]), found.floor, found.horizon),
+        base_misfit=_misfit(model, base, found),
         effects=effects,
         slots=_slots(comparison) or found.slots,
         location=locate(longest, errors, found.floor, model.values["u0"]),
         force=_force_beside(model, longest, errors, found.floor, fitter.accelerations),
     )
     return Answer(found=described, against=Against(kind="model", name=name, comparison=comparison))
+
+
+def _misfit(model: VehicleModel, base: Explanation, found: Diagnosis) -> Misfit:
+    """Where random forces act a filter carries it into each stretch, as it does what was found.
+
+    Else a model that knew none of the recording starts anew with each stretch.
+    """
+    spans = divide(found.recordings)
+    if not found.has_sea or found.horizon is not None:
+        return misfit(base, replace(spans, unseen=[]), found.floor, found.horizon)
+    taught = Fitter(spans.teaching, known=found.extended)
+    return misfit(_among_forces(_as_it_is(model, spans.teaching), taught), spans, found.floor)
+
+
+def _among_forces(base: Explanation, fitter: Fitter) -> Explanation:
+    return replace(base, fit=replace(base.fit, noise=levels(fitter, base.names, base.fit)))
 
 
 def _as_it_is(model: VehicleModel, recordings: list[Recording]) -> Explanation:

@@ -51,6 +51,7 @@ def write_report(answer: Answer, vehicle: str, path: Path) -> None:
         effects=[_effect(effect, answer) for effect in found.effects],
         held_out=found.is_held_out,
         horizon=found.horizon,
+        is_carried=found.has_sea and found.is_held_out and found.horizon is None,
         proof=_proof(answer),
         remaining=found.remaining,
         region=location.region[:1].upper() + location.region[1:],

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from host.diagnosis.explanation import Explanation
-from host.diagnosis.foretold import foretold_errors
+from host.diagnosis.foretold import following, foretold_errors
 from host.diagnosis.spans import Spans
-from host.kalman import kalman_pass
 from host.predict import SETTLING_SPAN, estimate_initial_state
 from host.propagate import Run, free_run, inputs_of
 from host.recording import Array, Recording
@@ -85,8 +84,7 @@ def _errors_passing(explanation: Explanation, spans: Spans) -> list[Array]:
         inputs = inputs_of(run, fit.structure)
         with np.errstate(over="ignore", invalid="ignore"):
             if fit.has_process_noise:
-                gains = kalman_pass(fit.parameters, initial, fit.noise, inputs).gains
-                passed = steered_run(fit.parameters, initial, inputs, gains)
+                passed = steered_run(fit.parameters, initial, inputs, following(fit, initial, inputs))
             else:
                 passed = free_run(fit.parameters, initial, inputs)
         # A run that leaves the numbers is as far off as can be, not only as far as it can be followed.

@@ -65,6 +65,22 @@ def test_where_seconds_are_foretold_so_are_those_of_the_model(coupled: Diagnosis
     assert true.chi2 < lacking.chi2 < 0.8 * whole.chi2
 
 
+def test_where_forces_act_a_filter_carries_the_model_too(
+    coupled: Diagnosis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def anew(*_: object) -> None:
+        raise AssertionError("what was found is carried into each stretch, the model begins anew")
+
+    monkeypatch.setattr("host.diagnosis.scoring.free_run_errors", anew)
+    found = replace(coupled, has_sea=True)
+    true, lacking = (
+        against_model(found, given(found, effects), "m.json").found.base_misfit
+        for effects in ({"heave_pitch_rate_coupling": {"c_wq": 0.8}}, {})
+    )
+    assert true.chi2 < 1.5
+    assert lacking.chi2_depth > 2.0 * true.chi2_depth
+
+
 def test_a_coefficient_that_differs_is_told_with_both_values(coupled: Diagnosis) -> None:
     answer = against_model(coupled, given(coupled, {"heave_pitch_rate_coupling": {"c_wq": 0.2}}), "m.json")
     assert answer.against is not None
