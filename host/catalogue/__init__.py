@@ -9,6 +9,7 @@ from host.catalogue import (
     actuator,
     changes,
     environment,
+    flow,
     heave,
     kinematics,
     moments,
@@ -23,6 +24,7 @@ from host.equations import Effect, Structure
 CATALOGUE: tuple[Effect, ...] = (
     *environment.EFFECTS,  # first: the speed through the water may depend on how that moves
     *surge.EFFECTS,
+    *flow.EFFECTS,
     *heave.EFFECTS,
     *pitch.EFFECTS,
     *heave.BY_TURNING,  # by all that turns the hull
@@ -48,6 +50,8 @@ ORDINARY = (
     "surge_pitch_coupling",
 )
 """What acts on every vehicle, strong or weak, beside an imperfect trim: the largest part first."""
+FAINT = ("heave_pitch_acceleration_coupling", "plane_in_cross_flow", "speed_independent_damping")
+"""What every vehicle has, too, but too weak to be found before all that is ordinary is there."""
 
 
 def named(name: str) -> Effect:

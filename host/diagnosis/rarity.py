@@ -12,13 +12,13 @@ and speed loss are not exact to that.
 from math import log
 from typing import TYPE_CHECKING
 
-from host.catalogue import BY_NAME, ORDINARY, named
+from host.catalogue import BY_NAME, FAINT, ORDINARY, named
 from host.catalogue.kin import measure_alike
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import margin
 from host.diagnosis.pruning import pruned
-from host.diagnosis.whole_vehicle import OFF_CENTRE, is_real
+from host.diagnosis.whole_vehicle import is_real
 
 if TYPE_CHECKING:
     from host.diagnosis.search import Search
@@ -72,7 +72,7 @@ def _without_the_slight(search: "Search", best: Explanation) -> Explanation:
 
 def _is_usual(name: str) -> bool:
     effect = named(name)
-    return name in {*ORDINARY, OFF_CENTRE} or bool(effect.changes)
+    return name in {*ORDINARY, *FAINT} or bool(effect.changes)
 
 
 def _tell_twins(search: "Search", best: Explanation, rare: str) -> None:

@@ -9,7 +9,7 @@ What the hull does late or twice passes for a short sea, too, if for one that is
 from math import inf
 from typing import Literal
 
-from host.catalogue import BY_NAME, ORDINARY
+from host.catalogue import BY_NAME, FAINT, ORDINARY
 from host.catalogue.kin import OFFSETS
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.leftover import SEA_DOUBT, Leftover
@@ -49,7 +49,7 @@ def verdict_on(
 
 def rare_in(explanation: Explanation) -> list[str]:
     """The effects of a set that not every vehicle has, and that are no offset or detail of another effect."""
-    usual = {*ORDINARY, *OFFSETS}
+    usual = {*ORDINARY, *FAINT, *OFFSETS}
     rare = [BY_NAME[name] for name in known_in(explanation) if name not in usual]
     return [effect.name for effect in rare if not effect.is_common and not effect.changes]
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import chi2
 
-from host.catalogue import BY_NAME, ORDINARY, structure_of
+from host.catalogue import BY_NAME, FAINT, ORDINARY, structure_of
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.margins import margin
 from host.diagnosis.pruning import pruned
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from host.diagnosis.search import Search
 
 MOST_ROUNDS = 3  # as more names see other valleys
-OFF_CENTRE = "heave_pitch_acceleration_coupling"  # weak: no hull carries its water quite about its middle
 BY_CHANCE = 1e-3
 SHOWN = 2  # of the effects that every vehicle has: one that shows so many is no textbook's
 
@@ -62,7 +61,7 @@ def with_all_ordinary(fitter: "Fitter", parent: Explanation) -> Explanation:
 
     In the likeliest of the valleys that the set alone can hardly tell apart.
     """
-    fit, names = parent.fit, parent.names | {*ORDINARY, OFF_CENTRE}
+    fit, names = parent.fit, parent.names | {*ORDINARY, *FAINT}
     here = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
     starts = [_begun(fitter, start, names) for start in (here, *look_alikes(here))]
     return fitter.polished(fitter.explained(names, fitter.fitted(starts)))

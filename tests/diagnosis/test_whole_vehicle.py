@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from hidden_dive import BASE, hidden_dive
 
-from host.catalogue import ORDINARY, structure_of
+from host.catalogue import FAINT, ORDINARY, structure_of
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.search import Search
 from host.diagnosis.whole_vehicle import (
-    OFF_CENTRE,
     beside_all,
     in_the_valley_of,
     is_real,
@@ -87,7 +86,7 @@ def test_a_set_that_is_nobody_s_vehicle_is_left_alone() -> None:
 def test_what_is_not_named_bends_the_rest_and_the_intervals_tell() -> None:
     fitter, best = few()
     all_of_it = with_all_ordinary(fitter, best)
-    assert all_of_it.names == {*FEW, *ORDINARY, OFF_CENTRE}
+    assert all_of_it.names == {*FEW, *ORDINARY, *FAINT}
     std = deviations_of(best)
     wider = widened(std, best, all_of_it)
     truth = BASE | TURNED

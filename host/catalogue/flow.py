@@ -1,0 +1,55 @@
+"""How damping and the plane's force follow the flow past the hull, other than u and u^2."""
+
+import casadi as ca
+
+from host.equations import Chain, Effect, Parameter
+
+
+def _steady_damping(c: Chain) -> None:
+    lacking = 1 - c.speed_ratio
+    c.heave += c.p["heave_damping_steady"] * c.p["a1"] * lacking * c.w
+    c.pitch += c.p["pitch_damping_steady"] * c.p["a2"] * lacking * c.q
+
+
+def _cross_flow(c: Chain) -> None:
+    # A plane that the flow meets at more than 45 deg has long stalled.
+    across = ca.fmin(ca.fabs(c.w) / c.p["u0"], c.speed_ratio) ** 2
+    c.heave += c.p["cross_flow_share"] * across * c.p["b1"] * c.plane
+    c.pitch += c.p["cross_flow_share"] * across * c.p["b2"] * c.plane
+
+
+EFFECTS = (
+    Effect(
+        name="speed_independent_damping",
+        slot="surge",
+        parameters=(
+            Parameter(
+                name="heave_damping_steady", unit="1", lower=0, upper=1, meaning="share of a1 that stays"
+            ),
+            Parameter(
+                name="pitch_damping_steady", unit="1", lower=0, upper=1, meaning="share of a2 that stays"
+            ),
+        ),
+        sentence="Damping does not fall with the speed as lift does: a part of it is there at any speed.",
+        equation="a1 u/u0 -> a1 [u/u0 + heave_damping_steady (1 - u/u0)], "
+        "a2 u/u0 -> a2 [u/u0 + pitch_damping_steady (1 - u/u0)]",
+        manoeuvre="the same plane steps at half and at full speed",
+        probes=((1.0, 1.0),),
+        sizes=("heave_damping_steady", "pitch_damping_steady"),
+        force=_steady_damping,
+        changes=("speed_loss",),
+    ),
+    Effect(
+        name="plane_in_cross_flow",
+        slot="actuator",
+        parameters=(
+            Parameter(name="cross_flow_share", unit="1", lower=0, upper=4, meaning="1 is the whole flow"),
+        ),
+        sentence="The plane's force follows the whole flow that it meets, heave and speed ahead together: it "
+        "is larger while the hull heaves.",
+        equation="b1, b2 ~ u^2 + cross_flow_share w^2",
+        manoeuvre="full plane reversals, during which the hull heaves most",
+        probes=((1.0,),),
+        force=_cross_flow,
+    ),
+)
