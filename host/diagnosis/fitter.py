@@ -43,6 +43,7 @@ NOT_THERE = 1.2  # times the sensor noise that the set left elsewhere: it has en
 HOPELESS = 0.1  # of a log-likelihood per sample: a few iterations hardly lead to more
 MADE_UP_FOR = 20.0  # of a log-likelihood, by fewer parameters or more usual ones
 SLIGHT = 2e-3  # of the variance of all force: 4 % of it, about as much as any model is off
+LINEAR = ("munk_moment", "actuator_lag", "heave_pitch_rate_coupling")
 ROUGHLY = 1.0  # of a log-likelihood: a set does at least as well as with one member less
 
 
@@ -101,6 +102,14 @@ class Fitter:
     def root(self) -> Explanation:
         """The base with a free constant force and moment; see host.diagnosis.trims."""
         return trimmed(self)
+
+    @cached_property
+    def linear(self) -> Explanation:
+        """The root with what moves every hull with its plane, as far as that is linear."""
+        hull = self.root
+        for name in LINEAR:
+            hull = self.grown(hull, name, [])
+        return hull
 
     def excess(self, fit: Fit) -> float:
         """Sensor noise of a fit over the noise floor, in the worse channel: 1 where nothing is left."""

@@ -56,20 +56,20 @@ def ways(recordings: list[Recording]) -> list[Way]:
 
 
 def by_single_effects(found: list[Way], on_progress: Callable[[str], None], jobs: int) -> list[Way]:
-    """The ways, the likelier first, as the effects see them that explain most alone.
+    """The ways, the likelier first, as the effects see them that explain most alone, or a linear hull.
 
     The base equations bend towards what they lack, and may follow the wrong way better by chance.
     """
-    leading = found[0]
-    if len(found) == 1 or leading.waves is not None:
+    if len(found) == 1 or found[0].waves is not None:
         return found
+    leading, other = sorted(found, key=lambda way: min(way.fitter.root.bic, way.fitter.linear.bic))
     with Workers(leading.fitter, jobs) as workers:
         search = Search(leading.fitter, workers, on_progress, leading.fitter.base, leading.fitter.root)
         leading = leading._replace(alone=tuple(search.singles()))
     best = sorted(leading.alone, key=lambda e: e.bic)[:LEADING]
-    least = min(leading.fitter.root.bic, best[0].bic) - NAMING_MARGIN
-    other = found[1]
-    there = (other.fitter.root.bic, *(other.fitter.reduced(e, e.names).bic for e in best))
+    least = min(leading.fitter.root.bic, best[0].bic, leading.fitter.linear.bic) - NAMING_MARGIN
+    alone = (other.fitter.reduced(e, e.names).bic for e in best)
+    there = (other.fitter.root.bic, *alone, other.fitter.linear.bic)
     return [other, leading] if min(there) < least else [leading, other]
 
 

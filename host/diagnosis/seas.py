@@ -31,6 +31,7 @@ from host.diagnosis.trims import retrimmed
 from host.diagnosis.workers import Task, Workers
 from host.waves import is_sea, mean_moment
 
+MOSTLY = 0.7  # of what waves explain: of true ones a linear hull explains at most 0.4, of false ones 0.9
 MEAN_MOMENTS = 2.0  # of what it may be: four seas came to 1.0 to 1.3
 
 
@@ -121,7 +122,10 @@ def _rough(calm: Search, best: Explanation, sets: list[Explanation]) -> tuple[Se
 
 
 def plain_waves(fitter: Fitter) -> Explanation | None:
-    """The root among waves, where these are likelier than white forces, and those than none."""
+    """The root among waves, where these are likelier than white forces, and those than none.
+
+    Not where the water would have to follow the plane.
+    """
     root = fitter.root
     if fitter.excess(root.fit) < LITTLE:
         return None
@@ -131,7 +135,13 @@ def plain_waves(fitter: Fitter) -> Explanation | None:
     if roughly_with_waves(fitter, sea).bic > sea.bic - NAMING_MARGIN:
         return None
     waves = with_waves(fitter, sea)
-    return waves if is_sea(waves.fit) else None
+    return waves if is_sea(waves.fit) and not _follow_the_plane(fitter, waves) else None
+
+
+def _follow_the_plane(fitter: Fitter, waves: Explanation) -> bool:
+    """Whether what passes for waves is mostly what the plane does to any hull."""
+    least = as_filtered(fitter, fitter.root).bic
+    return least - as_filtered(fitter, fitter.linear).bic > MOSTLY * (least - waves.bic)
 
 
 def in_plain_waves(calm: Search, waves: Explanation) -> Explained:

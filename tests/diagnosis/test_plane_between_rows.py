@@ -194,9 +194,21 @@ def test_a_model_file_says_what_the_plane_does_or_the_plane_is_held(tmp_path: Pa
         read_model(tmp_path / "m.json")
 
 
-def test_what_explains_most_alone_may_speak_against_the_base() -> None:
+def test_a_linear_hull_may_speak_against_the_base() -> None:
+    found = ways([dive("moving")])
+    turned, again = by_single_effects(found[::-1], lambda _: None, 1)
+    assert turned.recordings is found[0].recordings
+    assert [bool(one.alone) for one in (turned, again)] == [True, False]  # before any effect is tried
+
+
+def test_what_explains_most_alone_may_speak_against_the_base(monkeypatch: pytest.MonkeyPatch) -> None:
     found = ways([dive("moving")])
     kept, *_ = by_single_effects(found, lambda _: None, 1)
+    right, wrong = (way.fitter for way in found)
+    wrong_root = wrong.root
+    monkeypatch.setattr(wrong, "linear", wrong_root)
+    for name in ("root", "linear"):  # as if neither said so
+        monkeypatch.setattr(right, name, replace(right.root, bic=wrong_root.bic + 1.0))
     turned, again = by_single_effects(found[::-1], lambda _: None, 1)
     assert kept.recordings is turned.recordings is found[0].recordings
     assert [bool(one.alone) for one in (kept, turned, again)] == [True, False, True]

@@ -16,6 +16,7 @@ from host.diagnosis.search import Search
 from host.diagnosis.seas import (
     Explained,
     Waves,
+    _follow_the_plane,
     _of_the_waves,
     against,
     among_waves,
@@ -107,6 +108,21 @@ def test_what_only_passes_for_waves_is_none(monkeypatch: pytest.MonkeyPatch) -> 
         doubtful = in_plain_waves(calm, waves)
         assert not doubtful.left.is_nothing  # something else is left among them
     assert plain_waves(Fitter([hidden_dive(duration=60.0)])) is None
+
+
+def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> None:
+    fitter = Fitter([hidden_dive(lambda _, x, __: (0.0, 2.0 * x[0], 0.0), duration=60.0)])
+    as_good = replace(fitter.root, bic=fitter.linear.bic)
+    gain = fitter.root.bic - as_good.bic
+    assert gain > 1000.0
+    assert _follow_the_plane(fitter, as_good)
+    assert not _follow_the_plane(fitter, replace(as_good, bic=as_good.bic - gain))  # twice as much
+    rough = Fitter([hidden_dive(in_waves(lambda *_: (0.0, 0.0, 0.0), 0.02, 0.06), duration=60.0)])
+    waves = plain_waves(rough)
+    assert waves is not None
+    assert not _follow_the_plane(rough, waves)
+    monkeypatch.setattr("host.diagnosis.seas._follow_the_plane", lambda *_: True)
+    assert plain_waves(rough) is None
 
 
 def test_a_moment_no_larger_than_the_waves_own_is_theirs() -> None:
