@@ -53,7 +53,8 @@ class Search:
     alone  each effect alone, where these were fitted before
     rivals  sets that were fitted in an exchange
     joint   sets with all that every vehicle has
-    steered  what a continuation found likeliest while forces still steered the state
+    steered  what a continuation found likeliest while forces still steered the state; `at_sea` the same
+             among those that are likeliest beside it, once asked
     is_for_few  not for all that every vehicle has at once: something else explains the recordings
     """
 
@@ -68,6 +69,7 @@ class Search:
     rivals: set[Names] = field(default_factory=set)
     joint: set[Names] = field(default_factory=set)
     steered: Explanation | None = None
+    at_sea: Explanation | None = None
     is_for_few: bool = False
     _shrunk: dict[Names, set[Names]] = field(default_factory=dict)  # those fitted from larger sets: which
     _polished: set[Names] = field(default_factory=set)  # those of them fitted to the end

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import combinations
 from math import inf
 from typing import NamedTuple
 
@@ -79,10 +78,9 @@ def led_astray(calm: Search, best: Explanation) -> tuple[Search, Explanation] | 
 
     No effect, and no form of unknown physics, is to stand for these.
     """
-    likeliest = min(sets := _among_forces(calm, best), key=lambda e: e.bic)
-    if not (calm.follows_no_free_run or are_by_speed(calm.fitter, likeliest.fit)):
+    if not (calm.follows_no_free_run or any(are_by_speed(calm.fitter, e.fit) for e in _in_seas(calm, best))):
         return None
-    return _rough(calm, best, sets)
+    return _rough(calm, best, _among_forces(calm, best))
 
 
 def again_astray(
@@ -95,19 +93,37 @@ def again_astray(
     return Explained(best, search, leftover(fitter, best), None)
 
 
-def _among_forces(calm: Search, best: Explanation) -> list[Explanation]:
-    """What explains most among the random forces that are likeliest beside it.
+def _in_seas(calm: Search, best: Explanation) -> list[Explanation]:
+    """The best set without random forces, among those that are likeliest beside it.
 
-    That is what does without them, or what a continuation found before it let go of the forces, as no free
-    run tells of a hull that is unstable. Its free trim is explained by as few offsets as will do.
+    And what a continuation found before it let go of the forces, as no free run tells of a hull that is
+    unstable.
     """
     also = with_sea(calm.fitter, best)
     if calm.steered is None or calm.steered.bic > also.bic + ROUGH:
         return [also]
-    sea = with_sea(calm.fitter, calm.steered)
-    ways = [frozenset(way) for count in (0, 1, 2) for way in combinations(OFFSETS, count)]
-    tasks: list[Task] = [(retrimmed, (sea, way)) for way in ways]
-    return [also, min(calm.workers.results(tasks), key=lambda e: e.bic)]
+    if calm.at_sea is None:
+        calm.at_sea = with_sea(calm.fitter, calm.steered)
+    return [also, calm.at_sea]
+
+
+def _among_forces(calm: Search, best: Explanation) -> list[Explanation]:
+    """The same, a free trim explained by as few offsets as will do."""
+    also, *others = _in_seas(calm, best)
+    for sea in others:
+        if FREE_TRIM.name in sea.names:
+            one = _retrimmed(calm, sea, [(), *((name,) for name in OFFSETS)])
+            for name in one.names & {*OFFSETS}:
+                pairs = [(name, other) for other in OFFSETS if other != name]
+                one = min(one, _retrimmed(calm, sea, pairs), key=lambda e: e.bic)
+            calm.at_sea = one
+    return [also] if not others or calm.at_sea is None else [also, calm.at_sea]
+
+
+def _retrimmed(calm: Search, sea: Explanation, ways: list[tuple[str, ...]]) -> Explanation:
+    """The likeliest of the set with these offsets, or those, in place of its free trim."""
+    tasks: list[Task] = [(retrimmed, (sea, frozenset(way))) for way in ways]
+    return min(calm.workers.results(tasks), key=lambda e: e.bic)
 
 
 def _rough(calm: Search, best: Explanation, sets: list[Explanation]) -> tuple[Search, Explanation] | None:
