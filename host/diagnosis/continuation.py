@@ -38,6 +38,7 @@ SAME_END, SAME_SPEED = 3.0, 0.05  # of BIC, and of the speed, between two fits o
 CLEARLY = 50.0  # of BIC, that each must gain by then and at the end, where nothing seems to be lacking
 PROMISING, MOST_PROMISING = 2, 3  # effects that are tried where one may join, and at the first stage
 PLACES = 2  # in which each of them begins
+FAR_MORE = 3.0  # times what was left when no effect helped: fewer forces make up for less
 SLIGHTLY = 1.05  # times the variance expected: enough for another look at the moments
 FEW_STEPS, STEPS = 10, 40  # of the parameters at one stage: many lie along a ridge, where a stage is slow
 SPEED = NAMES.index("u0")
@@ -54,16 +55,19 @@ def continued(search: "Search", names: Names, most_beside: int) -> Explanation |
     fitter, common = search.fitter, names | {ALONG_THE_HULL}
     followed = _with_what_is_large(search, names)
     swapped = [at for one in followed for at in with_poles_swapped(_at(one))]
+    most = LITTLE  # that may be left without another look at what is lacking
     for share in STAGES[UNDECIDED:]:
         others = _steered(search, [_forced(fitter, at, share) for at in swapped])
         others = _under(search, [one for one in others if _is_near(one, followed[0], BEHIND)], share, STEPS)
         followed = _distinct([*_under(search, followed, share, STEPS), *others])[:FOLLOWED]
         followed = [one for one in followed if _is_near(one, followed[0], BEHIND)]
         followed, swapped = _moved(search, followed), []
-        while followed and _lacks(followed[0], LITTLE) and len(followed[0].names - common) < most_beside:
+        while followed and _left(followed[0]) > most and len(followed[0].names - common) < most_beside:
             larger = _best_of_each(_larger(search, followed[0], PROMISING))[:1]
             if not larger or larger[0].bic > followed[0].bic - NAMING_MARGIN:
+                most = FAR_MORE * _left(followed[0])
                 break
+            most = LITTLE
             followed = [*_moved(search, larger), *followed][:FOLLOWED]
         if not followed:
             return None
@@ -125,10 +129,9 @@ def _under(
     return _steered(search, [_forced(search.fitter, _at(one), share) for one in followed], steps)
 
 
-def _lacks(steered: Explanation, most: float) -> bool:
-    """Whether more is left, in either channel, than so many times what forces and noise account for."""
-    squares = [np.nanmean(np.hstack(steered.fit.whitened)[channel] ** 2) for channel in range(2)]
-    return bool(max(squares) > most)
+def _left(steered: Explanation) -> float:
+    """What is left, in the worse channel, over what forces and noise account for."""
+    return max(float(np.nanmean(np.hstack(steered.fit.whitened)[channel] ** 2)) for channel in range(2))
 
 
 def _best_of_each(found: list[Explanation]) -> list[Explanation]:
@@ -179,7 +182,7 @@ def _starts(search: "Search", parent: Explanation, name: str) -> list[Point]:
 
 def _moved(search: "Search", steered: list[Explanation]) -> list[Explanation]:
     """The likeliest, its moments in another rest of the plane where as the forces fall that is likelier."""
-    if not steered or not _lacks(steered[0], SLIGHTLY):
+    if not steered or _left(steered[0]) <= SLIGHTLY:
         return steered
     return _distinct([*steered, *_steered(search, with_other_moments(search.fitter, steered[0]))])[:FOLLOWED]
 

@@ -9,7 +9,7 @@ import numpy as np
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.margins import NAMING_MARGIN
+from host.diagnosis.margins import NAMING_MARGIN, margin
 from host.diagnosis.sea_fits import with_waves
 from host.diagnosis.search import Search
 from host.diagnosis.seas import plain_waves
@@ -88,13 +88,13 @@ def is_likelier(
     fitter = Fitter(other.fitter.recordings, known=best)
     if in_own_waves is not None:
         sets = [in_own_waves, *(fitter.reduced(in_own_waves, names) for names in _leaner(in_own_waves))]
-        return min(with_waves(fitter, one).bic for one in sets) < in_own_waves.bic - NAMING_MARGIN
+        return min(with_waves(fitter, one).bic for one in sets) < in_own_waves.bic - margin(in_own_waves)
     bare = [(e.names - {FREE_TRIM.name}, e) for e in sorted(search.tried.values(), key=lambda e: e.bic)]
     close = {best.names: best} | {names: e for names, e in bare[::-1] if names in _leaner(best)}
     for names, explanation in bare:
         if len(close) < CONTENDERS:
             close.setdefault(names, explanation)
-    least = best.bic - NAMING_MARGIN
+    least = best.bic - margin(best)
     if any(fitter.reduced(explanation, names).bic < least for names, explanation in close.items()):
         return True
     return is_real(best.names) and not best.fit.has_process_noise and _is_whole_likelier(fitter, search, best)
@@ -103,7 +103,7 @@ def is_likelier(
 def _is_whole_likelier(fitter: Fitter, search: Search, best: Explanation) -> bool:
     """Whether the vehicle is likelier so with all that it has: among that is what the wrong way lacks."""
     other = with_all_ordinary(fitter, fitter.reduced(best, best.names))
-    return other.bic < search.completion(best).bic - NAMING_MARGIN
+    return other.bic < search.completion(best).bic - margin(best)
 
 
 def _leaner(explanation: Explanation) -> list[Names]:

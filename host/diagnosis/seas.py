@@ -27,7 +27,7 @@ from host.diagnosis.sea_fits import (
 from host.diagnosis.search import Search
 from host.diagnosis.speed_forces import are_by_speed
 from host.diagnosis.trims import retrimmed
-from host.diagnosis.workers import Task, Workers
+from host.diagnosis.workers import Workers
 from host.waves import is_sea, mean_moment
 
 MOSTLY = 0.7  # of what waves explain: of true ones a linear hull explains at most 0.4, of false ones 0.9
@@ -112,18 +112,18 @@ def _among_forces(calm: Search, best: Explanation) -> list[Explanation]:
     also, *others = _in_seas(calm, best)
     for sea in others:
         if FREE_TRIM.name in sea.names:
-            one = _retrimmed(calm, sea, [(), *((name,) for name in OFFSETS)])
+            one = _retrimmed(calm, sea, [frozenset(), *(frozenset({name}) for name in OFFSETS)])
             for name in one.names & {*OFFSETS}:
-                pairs = [(name, other) for other in OFFSETS if other != name]
+                pairs = [frozenset({name, other}) for other in OFFSETS if other != name]
                 one = min(one, _retrimmed(calm, sea, pairs), key=lambda e: e.bic)
             calm.at_sea = one
     return [also] if not others or calm.at_sea is None else [also, calm.at_sea]
 
 
-def _retrimmed(calm: Search, sea: Explanation, ways: list[tuple[str, ...]]) -> Explanation:
+def _retrimmed(calm: Search, sea: Explanation, ways: list[Names]) -> Explanation:
     """The likeliest of the set with these offsets, or those, in place of its free trim."""
-    tasks: list[Task] = [(retrimmed, (sea, frozenset(way))) for way in ways]
-    return min(calm.workers.results(tasks), key=lambda e: e.bic)
+    found: list[Explanation] = calm.workers.results([(retrimmed, (sea, way)) for way in ways])
+    return min(found, key=lambda e: e.bic)
 
 
 def _rough(calm: Search, best: Explanation, sets: list[Explanation]) -> tuple[Search, Explanation] | None:
