@@ -49,7 +49,7 @@ class Search:
 
     base  the paper's equations alone, `root` the same with a free trim; all that is tried grows from it, with
           random forces where the root has them
-    part  the search over an excerpt of the recordings that this one goes on from
+    part  the search, over an excerpt of the recordings or without random forces, that this one goes on from
     alone  each effect alone, where these were fitted before
     rivals  sets that were fitted in an exchange
     joint   sets with all that every vehicle has

@@ -14,7 +14,7 @@ from host.catalogue.unknown import SWINGING_MOMENT
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import Leftover, leftover
-from host.diagnosis.margins import LITTLE, NAMING_MARGIN, ROUGH, margin
+from host.diagnosis.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, ROUGH, margin
 from host.diagnosis.sea_fits import (
     WAVES,
     again_under_forces,
@@ -127,12 +127,17 @@ def _retrimmed(calm: Search, sea: Explanation, ways: list[Names]) -> Explanation
 
 
 def _rough(calm: Search, best: Explanation, sets: list[Explanation]) -> tuple[Search, Explanation] | None:
-    """The search with random forces from these sets; None where they explain no more than `best` without."""
+    """The search with random forces from these sets; None where they explain no more than `best` without.
+
+    Of many effects that leave little without them, each was exchanged there.
+    """
     fitter, root = calm.fitter, with_sea(calm.fitter, calm.root)
+    is_settled = len(best.names) > LARGEST_SET and fitter.excess(best.fit) < LITTLE
+    before = calm if is_settled else calm.part
     least = as_filtered(fitter, best).bic
     if min(one.bic for one in (root, *sets)) > least - NAMING_MARGIN:
         return None
-    rough = Search(fitter, calm.workers, calm.on_progress, with_sea(fitter, calm.base), root, calm.part)
+    rough = Search(fitter, calm.workers, calm.on_progress, with_sea(fitter, calm.base), root, before)
     found = rough.run(sets)
     return (rough, found) if found.bic < least else None
 

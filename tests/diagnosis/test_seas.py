@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hidden_dive import Extra, hidden_dive
 
-from host.catalogue import structure_of
+from host.catalogue import ORDINARY, structure_of
 from host.diagnosis.diagnose import _judge, _unnamed, diagnose
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
@@ -18,6 +18,7 @@ from host.diagnosis.seas import (
     Waves,
     _follow_the_plane,
     _of_the_waves,
+    _rough,
     against,
     among_waves,
     explains_more,
@@ -123,6 +124,24 @@ def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> Non
     assert not _follow_the_plane(rough, waves)
     monkeypatch.setattr("host.diagnosis.seas._follow_the_plane", lambda *_: True)
     assert plain_waves(rough) is None
+
+
+@pytest.mark.parametrize(("members", "is_settled"), [(ORDINARY[:5], True), (ORDINARY[:2], False)])
+def test_many_effects_that_leave_little_are_not_exchanged_again_among_forces(
+    members: tuple[str, ...], is_settled: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitter = Fitter([hidden_dive(duration=40.0)])
+    calm = Search(fitter, Workers(fitter, 1), lambda _: None, fitter.base, fitter.root)
+    best, likelier = (replace(fitter.base, bic=fitter.base.bic - less) for less in (0.0, 100.0))
+    went_on_from: list[Search | None] = []
+
+    def run(search: Search, also: list[Explanation]) -> Explanation:
+        went_on_from.append(search.part)
+        return also[0]
+
+    monkeypatch.setattr(Search, "run", run)
+    assert _rough(calm, replace(best, names=frozenset(members)), [likelier]) is not None
+    assert went_on_from == [calm if is_settled else None]
 
 
 def test_a_moment_no_larger_than_the_waves_own_is_theirs() -> None:
