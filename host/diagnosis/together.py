@@ -27,10 +27,26 @@ HARDLY_LESS = 0.95  # of what is left over the noise floor: another effect besid
 
 
 def together(search: "Search", leading: Explanation) -> Explanation | None:
-    """The leading set with all that every vehicle has, more if need be, pruned; None if too much is left."""
+    """The leading set with all that every vehicle has, more if need be, pruned; None if too much is left.
+
+    Where it has led astray, all that every vehicle has by continuation, which needs no set to begin with, but
+    takes longest.
+    """
     search.on_progress("what every vehicle has")
-    fitter, best = search.fitter, _joint(search, leading)
-    left = fitter.excess(best.fit)
+    fitter, best = search.fitter, with_ordinary(search, leading)
+    if fitter.excess(best.fit) < MUCH:
+        best = _with_more(search, best)
+    if fitter.excess(best.fit) > LITTLE and (end := _by_continuation(search)) is not None:
+        best = _with_more(search, min(end, best, key=lambda e: e.bic))
+    if fitter.excess(best.fit) > LITTLE and is_above_floor(fitter, best.fit):
+        return None
+    best = pruned(search, best)
+    return best if best.bic < leading.bic else None
+
+
+def _with_more(search: "Search", best: Explanation) -> Explanation:
+    """The set with what else promises most, as long as much is left and it helps."""
+    left = search.fitter.excess(best.fit)
     for _ in range(MOST_BESIDE):
         if left < LITTLE:
             break
@@ -41,13 +57,10 @@ def together(search: "Search", leading: Explanation) -> Explanation | None:
             break
         best = better
         search.joint.add(best.names)
-        before, left = left, fitter.excess(best.fit)
+        before, left = left, search.fitter.excess(best.fit)
         if left > MUCH and left > HARDLY_LESS * before:
-            return None
-    if left > LITTLE and is_above_floor(fitter, best.fit):
-        return None
-    best = pruned(search, best)
-    return best if best.bic < leading.bic else None
+            break
+    return best
 
 
 def completed(search: "Search", best: Explanation) -> Explanation:
@@ -85,17 +98,15 @@ def with_ordinary(search: "Search", explanation: Explanation) -> Explanation:
     return search.remember(search.fitter.polished(explanation))
 
 
-def _joint(search: "Search", leading: Explanation) -> Explanation:
-    """All that every vehicle has: by continuation, which needs no set to begin with, or joining one."""
+def _by_continuation(search: "Search") -> Explanation | None:
+    """All that every vehicle has, with little beside it; None where the filter loses the recording."""
     names = frozenset({*ORDINARY, FREE_TRIM.name, PLANE_BEFORE.name})
     found = continued(search, names, MOST_BESIDE)
     if found is None:
-        return with_ordinary(search, leading)
+        return None
     end = search.remember(search.fitter.polished(found))
     search.joint.add(end.names)
-    if search.fitter.excess(end.fit) < LITTLE:
-        return end
-    return min(end, with_ordinary(search, leading), key=lambda e: e.bic)
+    return end
 
 
 def _more(search: "Search", best: Explanation) -> list[Task]:

@@ -24,7 +24,9 @@ class Rounds:
         self.fitter = SimpleNamespace(excess=lambda fit: fit)
         self.workers = SimpleNamespace(results=self._next)
         self.leading = SimpleNamespace(names=frozenset({0}), fit=20.0, bic=0.0)
-        patch.setattr(module, "_joint", lambda search, _: search.sets[0])
+        self.continued = 0
+        patch.setattr(module, "with_ordinary", lambda search, _: search.sets[0])
+        patch.setattr(module, "_by_continuation", Rounds._continued)
         patch.setattr(module, "_more", lambda *_: [])
         patch.setattr(module, "margin", lambda _: 6.0)
         patch.setattr(module, "pruned", lambda _, best: best)
@@ -32,6 +34,10 @@ class Rounds:
         patch.setattr(module, "is_above_floor", lambda *_: is_above_floor)
 
     def on_progress(self, _: str) -> None: ...
+
+    def _continued(self) -> Any:
+        self.continued += 1
+        return self.sets[0]
 
     def _next(self, _: list[Any]) -> list[Any]:
         self.rounds += 1
@@ -54,6 +60,25 @@ def test_another_effect_that_takes_hardly_anything_away_ends_it(monkeypatch: pyt
 def test_as_long_as_less_is_left_more_join(monkeypatch: pytest.MonkeyPatch) -> None:
     search = Rounds([10.4, 6.0, 2.5, 1.05], True, monkeypatch)
     assert found(search) is search.sets[3]
+    assert search.continued == 1
+
+
+@pytest.mark.parametrize("left", [[1.05], [1.6, 1.05]])
+def test_where_they_join_and_little_is_left_no_continuation_is_needed(
+    left: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search = Rounds(left, True, monkeypatch)
+    assert found(search) is search.sets[-1]
+    assert search.continued == 0
+
+
+def test_where_more_that_joins_does_not_help_a_continuation_begins_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    search = Rounds([1.6], True, monkeypatch)
+    end = SimpleNamespace(names=frozenset({9}), fit=1.02, bic=-9000.0)
+    monkeypatch.setattr(module, "_by_continuation", lambda _: end)
+    assert found(search) is end
 
 
 def test_what_is_left_within_the_doubt_about_the_sensors_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
