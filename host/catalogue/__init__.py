@@ -36,7 +36,13 @@ CHANGES = changes.EFFECTS
 """Entries that are tried only where something is known to have changed."""
 BY_NAME = {effect.name: effect for effect in (*CHANGES, *CATALOGUE)}  # what changes a speed, before its loss
 UNKNOWN = {effect.name: effect for effect in unknown.FORMS}
-_TOOLS = (nuisance.FREE_TRIM, nuisance.PLANE_BEFORE, unknown.ANY_SMOOTH_FORCE, *moments.SCANS.values())
+_TOOLS = (
+    nuisance.FREE_TRIM,
+    nuisance.PLANE_BEFORE,
+    nuisance.SPEED_CORRECTION,
+    unknown.ANY_SMOOTH_FORCE,
+    *moments.SCANS.values(),
+)
 _ALL = BY_NAME | UNKNOWN | {effect.name: effect for effect in _TOOLS}
 ORDINARY = (
     "heave_pitch_rate_coupling",

@@ -42,6 +42,29 @@ PLANE_BEFORE = Effect(
 )
 """Where a recording begins as the plane is put over, a servo, a delay or play still have it elsewhere."""
 
+SPEED_CORRECTION = Effect(
+    name="speed_correction",
+    slot="surge",
+    parameters=(
+        Parameter(
+            name="speed_gain", unit="1/s", lower=0.02, upper=5, meaning="how fast readings correct the speed"
+        ),
+    ),
+    sentence="The measured speed errs: how thrust, drag and weight change it tells more than each reading.",
+    equation="u' = (the surge equation of speed_loss) + speed_gain (u measured - u)",
+    manoeuvre="a recording with a more precise speed sensor",
+    probes=((2.0,), (0.2,)),
+    sizes=(),
+    is_common=True,
+    changes=("speed_loss",),
+)
+"""A noisy or slow speed sensor misses how the speed falls in a turn, or tells it late.
+
+An observer: with a large gain the speed is the measured one, with a small one that of the surge equation
+about the mean of what was measured. It frees the coefficients of that equation, which a measured speed alone
+does not need (Fitter.held_in).
+"""
+
 
 def has_memory(effect: Effect) -> bool:
     """Whether the plane depends on commands that were given before."""

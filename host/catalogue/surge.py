@@ -7,16 +7,28 @@ from host.equations import Chain, Effect, Parameter
 
 
 def _speed_loss(c: Chain) -> None:
-    change, is_known = c.extra["speed_loss"], c.is_speed_known
-    c.speed = c.speed + change * (1 - is_known)
+    change, known, before = c.extra["speed_loss"], c.is_speed_known, c.speed
+    c.speed = before + change * (1 - known)
+    if "speed_gain" in c.p:
+        c.speed = (c.p["u0"] + change) * known + c.speed * (1 - known)
     c.speed_ratio = c.speed / c.p["u0"]
-    c.rates["speed_loss"] = (
-        -change * (1 + c.speed_ratio) / 2 / c.p["speed_time"]
-        - c.p["c_ud"] * (c.speed_ratio * c.plane) ** 2
+    force = (
+        -c.p["c_ud"] * (c.speed_ratio * c.plane) ** 2
         # Both are known per heave mass; c_uq makes them accelerations of the surge mass.
         - c.p["c_uq"] * (c.w * c.q + net_weight(c) * ca.sin(c.theta))
     )
-    c.surge = c.surge + c.rates["speed_loss"] * (1 - is_known)
+    rate = force - change * (1 + c.speed_ratio) / 2 / c.p["speed_time"]
+    if "speed_gain" in c.p:
+        rate = rate + c.p["speed_gain"] * (before - c.speed) * known
+        c.surge = rate
+    else:
+        c.surge = c.surge + rate * (1 - known)
+    c.rates["speed_loss"] = rate
+
+
+def _begins(c: Chain) -> ca.SX:
+    """At the measured speed, where it is corrected; else at that without any loss."""
+    return (c.speed - c.p["u0"]) * c.is_speed_known if "speed_gain" in c.p else 0 * c.zeta
 
 
 EFFECTS = (
@@ -38,6 +50,6 @@ EFFECTS = (
         sizes=("c_ud", "c_uq"),
         force=_speed_loss,
         state="speed_loss",
-        initial=lambda c: 0 * c.zeta,
+        initial=_begins,
     ),
 )

@@ -7,7 +7,7 @@ import numpy as np
 
 from host.catalogue import CATALOGUE, CHANGES, named, structure_of
 from host.catalogue.moments import FIRST, LAST
-from host.catalogue.nuisance import FREE_TRIM
+from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE, SPEED_CORRECTION, has_memory
 from host.catalogue.unknown import SPANS
 from host.diagnosis.absence import one_step_without
 from host.diagnosis.charges import charged_bic
@@ -43,6 +43,8 @@ NOT_THERE = 1.2  # times the sensor noise that the set left elsewhere: it has en
 HOPELESS = 0.1  # of a log-likelihood per sample: a few iterations hardly lead to more
 MADE_UP_FOR = 20.0  # of a log-likelihood, by fewer parameters or more usual ones
 SLIGHT = 2e-3  # of the variance of all force: 4 % of it, about as much as any model is off
+SURGE = {"speed_time": 10.0, "c_ud": 0.0, "c_uq": 0.0}
+"""Coefficients of the surge equation, and what they are where nothing tells them."""
 LINEAR = ("munk_moment", "actuator_lag", "heave_pitch_rate_coupling")
 ROUGHLY = 1.0  # of a log-likelihood: a set does at least as well as with one member less
 
@@ -67,8 +69,7 @@ class Fitter:
         if recordings[0].has_speed:
             self.held["u0"] = mean_speed(recordings)
             # Where the speed is measured its loss is data, and there is nothing in it to estimate.
-            self.held |= {name: 0.0 for name in ("c_ud", "c_uq", "speed_step")} | {"speed_time": 1.0}
-            self.held["speed_change_time"] = 0.0
+            self.held |= SURGE | {"speed_step": 0.0, "speed_change_time": 0.0}
         else:
             self.held["ground_share"] = 0.0
         self.held |= dict.fromkeys(SPANS.values(), max(float(r.time[-1]) for r in recordings))
@@ -205,7 +206,7 @@ class Fitter:
     def carried_over(self, explanation: Explanation) -> Point:
         """The coefficients of a fit to other stretches, with states such as these begin with."""
         structure, values = structure_of(explanation.names), explanation.fit.parameters.copy()
-        for name, value in self.held.items():
+        for name, value in self.held_in(explanation.names).items():
             if name in structure.names:
                 values[structure.names.index(name)] = value
         initial = [
@@ -214,9 +215,20 @@ class Fitter:
         ]
         return Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0]))
 
+    def held_in(self, names: Names) -> dict[str, float]:
+        """What is held in a set: of the surge equation nothing where it corrects the measured speed."""
+        is_corrected = SPEED_CORRECTION.name in names
+        return {name: value for name, value in self.held.items() if not (is_corrected and name in SURGE)}
+
+    def tools_beside(self, names: Names) -> tuple[str, ...]:
+        """What a set needs that is no physics: the plane's angle before, and errors of a measured speed."""
+        remembers = any(has_memory(named(name)) for name in names)
+        is_astray = "speed_loss" in names and any(error is not None for error in self._speed_errors)
+        return (PLANE_BEFORE.name,) * remembers + (SPEED_CORRECTION.name,) * is_astray
+
     def free(self, names: Names) -> Mask:
         """Which parameters of a set are estimated."""
-        held = {*self.held}
+        held = {*self.held_in(names)}
         if FREE_TRIM.name in names:
             held.add("neutral_depth")  # which would do the same
         return np.array([name not in held for name in structure_of(names).names])
@@ -257,7 +269,7 @@ class Fitter:
         known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
         if added is not None and probe is not None:
             known |= {p.name: v for p, v in zip(named(added).parameters, probe.tolist(), strict=True)}
-        known |= {name: value for name, value in self.held.items() if name in known}
+        known |= {name: value for name, value in self.held_in(names).items() if name in known}
         structure = structure_of(names)
         return Point(structure, np.array([known[name] for name in structure.names]), fit.initial, fit.levels)
 

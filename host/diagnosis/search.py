@@ -15,7 +15,7 @@ from math import inf
 
 from host.catalogue import named
 from host.catalogue.kin import OFFSETS
-from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE, has_memory
+from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import WANDERING
 from host.diagnosis.absence import promises_more
 from host.diagnosis.exchange import exchanged, twins
@@ -313,7 +313,7 @@ class Search:
     def candidates(self, parent: Explanation) -> list[str]:
         """What may join a set: the offsets only once the free trim, which does their work, has gone.
 
-        What changes other terms joins these; and where the plane was before, once it matters.
+        What changes other terms joins these; and what is no physics, where it matters (Fitter.tools_beside).
         """
         barred = {*parent.names, *(OFFSETS if FREE_TRIM.name in parent.names else ())}
         candidates = [
@@ -321,6 +321,5 @@ class Search:
             for effect in self.fitter.candidates
             if effect.name not in barred and (not effect.changes or parent.names & {*effect.changes})
         ]
-        if PLANE_BEFORE.name not in parent.names and any(has_memory(named(name)) for name in parent.names):
-            candidates.append(PLANE_BEFORE.name)
-        return candidates
+        tools = self.fitter.tools_beside(parent.names)
+        return candidates + [name for name in tools if name not in parent.names]

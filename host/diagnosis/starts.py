@@ -82,7 +82,7 @@ def idle_values(fitter: "Fitter", names: Names, known: dict[str, float]) -> Arra
         for parameter, probe in zip(effect.parameters, effect.probes[0], strict=True):
             is_size = parameter.name in effect.size_names
             values.setdefault(parameter.name, LIKELY.get(parameter.name, 0.0 if is_size else probe))
-    values |= {name: value for name, value in fitter.held.items() if name in values}
+    values |= {name: value for name, value in fitter.held_in(names).items() if name in values}
     return structure.clipped(np.array([values[name] for name in structure.names]))
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from host.catalogue import ORDINARY
 from host.catalogue.kin import OFFSETS
-from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE
+from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.continuation import continued
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.leftover import is_above_floor
@@ -88,8 +88,8 @@ def _was_joint(search: "Search", best: Explanation) -> bool:
 
 
 def with_ordinary(search: "Search", explanation: Explanation) -> Explanation:
-    """The set with all that every vehicle has, whatever the plane did before the recording."""
-    for name in (*ORDINARY, PLANE_BEFORE.name):
+    """The set with all that every vehicle has, whatever the plane did before, and a speed sensor tells."""
+    for name in (*ORDINARY, *search.fitter.tools_beside(frozenset(ORDINARY))):
         if name not in explanation.names:
             grown = search.fitter.grown(explanation, name, search.values(name))
             if isfinite(grown.bic):
@@ -100,7 +100,7 @@ def with_ordinary(search: "Search", explanation: Explanation) -> Explanation:
 
 def _by_continuation(search: "Search") -> Explanation | None:
     """All that every vehicle has, with little beside it; None where the filter loses the recording."""
-    names = frozenset({*ORDINARY, FREE_TRIM.name, PLANE_BEFORE.name})
+    names = frozenset({*ORDINARY, FREE_TRIM.name, *search.fitter.tools_beside(frozenset(ORDINARY))})
     found = continued(search, names, MOST_BESIDE)
     if found is None:
         return None

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from host.catalogue import BY_NAME, FAINT, ORDINARY, structure_of
+from host.catalogue.nuisance import SPEED_CORRECTION
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.margins import margin
 from host.diagnosis.pruning import pruned
@@ -62,6 +63,7 @@ def with_all_ordinary(fitter: "Fitter", parent: Explanation) -> Explanation:
     In the likeliest of the valleys that the set alone can hardly tell apart.
     """
     fit, names = parent.fit, parent.names | {*ORDINARY, *FAINT}
+    names |= {SPEED_CORRECTION.name} & {*fitter.tools_beside(names)}
     here = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
     starts = [_begun(fitter, start, names) for start in (here, *look_alikes(here))]
     return fitter.polished(fitter.explained(names, fitter.fitted(starts)))
