@@ -49,20 +49,26 @@ SPEED_CORRECTION = Effect(
         Parameter(
             name="speed_gain", unit="1/s", lower=0.02, upper=5, meaning="how fast readings correct the speed"
         ),
+        Parameter(
+            name="balanced_share", unit="1", lower=0.7, upper=1.5, meaning="thrust's speed over u0, at first"
+        ),
     ),
     sentence="The measured speed errs: how thrust, drag and weight change it tells more than each reading.",
-    equation="u' = (the surge equation of speed_loss) + speed_gain (u measured - u)",
+    equation="u' = (the surge equation of speed_loss, about b instead of u0) + speed_gain (u measured - u), "
+    "b' = (u measured - u)/60 s, b(0) = balanced_share u0",
     manoeuvre="a recording with a more precise speed sensor",
-    probes=((2.0,), (0.2,)),
+    probes=((2.0, 1.0), (0.2, 1.0)),
     sizes=(),
+    state="balance",
+    initial=lambda c: c.p["u0"] * (c.p["balanced_share"] - 1),
     is_common=True,
     changes=("speed_loss",),
 )
 """A noisy or slow speed sensor misses how the speed falls in a turn, or tells it late.
 
-An observer: with a large gain the speed is the measured one, with a small one that of the surge equation
-about the mean of what was measured. It frees the coefficients of that equation, which a measured speed alone
-does not need (Fitter.held_in).
+An observer: with a large gain the speed is the measured one, with a small one that of the surge equation. The
+speed b at which thrust and drag balance follows the measured one over the minutes, so that the speed keeps to
+it. It frees the coefficients of that equation, which a measured speed alone does not need (Fitter.held_in).
 """
 
 

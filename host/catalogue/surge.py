@@ -5,6 +5,8 @@ import casadi as ca
 from host.catalogue.weight import net_weight
 from host.equations import Chain, Effect, Parameter
 
+MINUTE = 60.0  # s
+
 
 def _speed_loss(c: Chain) -> None:
     change, known, before = c.extra["speed_loss"], c.is_speed_known, c.speed
@@ -17,9 +19,12 @@ def _speed_loss(c: Chain) -> None:
         # Both are known per heave mass; c_uq makes them accelerations of the surge mass.
         - c.p["c_uq"] * (c.w * c.q + net_weight(c) * ca.sin(c.theta))
     )
-    rate = force - change * (1 + c.speed_ratio) / 2 / c.p["speed_time"]
+    beyond = change - c.extra["balance"] * known if "speed_gain" in c.p else change
+    rate = force - beyond * (1 + c.speed_ratio) / 2 / c.p["speed_time"]
     if "speed_gain" in c.p:
-        rate = rate + c.p["speed_gain"] * (before - c.speed) * known
+        error = (before - c.speed) * known
+        c.rates["balance"] = error / MINUTE
+        rate = rate + c.p["speed_gain"] * error
         c.surge = rate
     else:
         c.surge = c.surge + rate * (1 - known)

@@ -1,0 +1,116 @@
+"""A measured speed that errs, corrected by the surge equation."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from host.catalogue import structure_of
+from host.catalogue.nuisance import SPEED_CORRECTION
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import SURGE, Fitter
+from host.diagnosis.unknown_physics import known_in
+from host.propagate import free_run, inputs_of
+from host.recording import Array, Recording
+from tests.diagnosis.hidden_dive import BASE, hidden_dive
+
+RECOVERY, DRAG = 4.0, 8.0  # s, m/s^2/rad^2
+CORRECTED = frozenset({"speed_loss", SPEED_CORRECTION.name})
+
+
+@cache
+def slowing(noise: float) -> Recording:
+    """A hull that the plane slows, its speed told with so much noise, m/s."""
+    plain, rng = hidden_dive(duration=120.0), np.random.default_rng(5)
+    x, states = np.array([0.0, 0.0, 0.0, 20.0, BASE["u0"]]), np.empty((5, plain.time.size))
+    for k, plane in enumerate(plain.rudder.tolist()):
+        states[:, k] = x
+
+        def rate(_: float, x: Array, plane: float = plane) -> list[float]:
+            w, q, theta, _, u = x
+            ratio = u / BASE["u0"]
+            return [
+                BASE["a1"] * ratio * w + BASE["b1"] * ratio**2 * plane,
+                BASE["a2"] * ratio * q + BASE["a3"] * theta + BASE["b2"] * ratio**2 * plane,
+                q,
+                w - u * theta,
+                BASE["u0"] * (1.0 - ratio**2) / (2.0 * RECOVERY) - DRAG * (ratio * plane) ** 2,
+            ]
+
+        x = solve_ivp(rate, (0.0, plain.step), x, rtol=1e-8, atol=1e-10).y[:, -1]
+    return replace(
+        plain,
+        depth=states[3] + 0.01 * rng.standard_normal(plain.time.size),
+        pitch=states[2] + np.deg2rad(0.1) * rng.standard_normal(plain.time.size),
+        speed=states[4] + noise * rng.standard_normal(plain.time.size),
+    )
+
+
+@cache
+def explained(noise: float) -> tuple[Fitter, Explanation, Explanation]:
+    """The dive explained by speed loss, as the speed is measured and with it corrected."""
+    fitter = Fitter([slowing(noise)])
+    taken = fitter.polished(fitter.grown(fitter.base, "speed_loss", []))
+    return fitter, taken, fitter.polished(fitter.grown(taken, SPEED_CORRECTION.name, []))
+
+
+def value(explanation: Explanation, name: str) -> float:
+    return float(explanation.fit.parameters[explanation.fit.structure.names.index(name)])
+
+
+def test_the_surge_equation_tells_what_a_noisy_sensor_does_not() -> None:
+    fitter, taken, corrected = explained(0.1)
+    assert taken.bic - corrected.bic > 50.0
+    assert fitter.excess(corrected.fit) < 1.15 < fitter.excess(taken.fit)
+    ratio = value(corrected, "u0") / BASE["u0"]
+    assert value(corrected, "c_ud") == pytest.approx(DRAG * ratio**2, rel=0.1)
+    assert value(corrected, "a1") == pytest.approx(BASE["a1"] * ratio, rel=0.05)
+    assert value(corrected, "balanced_share") == pytest.approx(1.0 / ratio, rel=0.05)
+
+
+def test_a_correction_is_no_physics_and_is_not_named() -> None:
+    _, _, corrected = explained(0.1)
+    assert known_in(corrected) == ["speed_loss"]
+
+
+def test_it_is_asked_only_of_a_speed_whose_errors_matter_beside_a_loss_of_it() -> None:
+    noisy, precise, untold = (Fitter([slowing(noise)]) for noise in (0.1, 1e-5, np.nan))
+    loss = frozenset({"speed_loss"})
+    assert noisy.tools_beside(loss) == (SPEED_CORRECTION.name,)
+    assert noisy.tools_beside(frozenset({"munk_moment"})) == ()
+    assert precise.tools_beside(loss) == untold.tools_beside(loss) == ()
+
+
+def test_a_measured_speed_alone_leaves_nothing_of_the_surge_equation_to_estimate() -> None:
+    fitter, taken, corrected = explained(0.1)
+    assert {name: value(taken, name) for name in SURGE} == SURGE
+    assert fitter.free_parameters(taken.names) == 0
+    assert fitter.free_parameters(corrected.names) == len(SURGE) + 2
+    assert {name: value(fitter.shrunk(corrected, SPEED_CORRECTION.name), name) for name in SURGE} == SURGE
+
+
+def speeds(gain: float, rates: dict[str, float] | None = None) -> Array:
+    """The speed in a free run over the dive, as it is corrected with this gain."""
+    recording, structure = slowing(1e-5), structure_of(CORRECTED)
+    known = (
+        BASE
+        | {"heave_offset": 0.0, "pitch_offset": 0.0}
+        | SURGE
+        | {"speed_gain": gain, "balanced_share": 1.0}
+        | (rates or {})
+    )
+    start = np.array([0.0, 0.0, 0.0, 20.0])
+    run = free_run(np.array([known[n] for n in structure.names]), start, inputs_of(recording, structure))
+    return np.asarray(BASE["u0"] + run.states[structure.states.index("speed_loss")])
+
+
+def test_with_a_large_gain_the_speed_is_the_measured_one() -> None:
+    assert np.abs(speeds(5.0) - slowing(1e-5).speed)[1:].max() < 0.1
+    assert np.abs(speeds(0.02) - slowing(1e-5).speed)[1:].max() > 0.3
+
+
+def test_with_a_small_gain_it_is_that_of_the_surge_equation() -> None:
+    told = speeds(0.02, {"speed_time": RECOVERY, "c_ud": DRAG})
+    assert np.abs(told - slowing(1e-5).speed).max() < 0.05
