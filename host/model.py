@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from host.catalogue import BY_NAME, UNKNOWN, named, structure_of
+from host.catalogue.nuisance import SPEED_CORRECTION
 from host.equations import NAMES, PARAMETERS, Structure
 from host.errors import RecordingError
 from host.recording import Array, Recording
@@ -123,7 +124,7 @@ def write_model(model: VehicleModel, path: Path) -> None:
 
 def _check_effect(effect: Any, path: Path) -> None:
     name = effect.get("name") if isinstance(effect, dict) else effect
-    if name not in BY_NAME | UNKNOWN:
+    if name not in {*BY_NAME, *UNKNOWN, SPEED_CORRECTION.name}:
         raise RecordingError(f"{path}: holds an effect this version does not know ({name})")
     for parameter in named(name).parameters:
         entry = effect.get("parameters", {}).get(parameter.name)

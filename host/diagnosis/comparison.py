@@ -15,13 +15,15 @@ import numpy as np
 from scipy.stats import chi2
 
 from host.catalogue import named
+from host.catalogue.nuisance import PLANE_BEFORE, SPEED_CORRECTION
 from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
+from host.diagnosis.fitter import SURGE, Fitter
 from host.diagnosis.margins import NAMING_MARGIN
 from host.equations import NAMES, PARAMETERS
 from host.uncertainty import covariance
 
 SIGNIFICANCE = 1e-3  # chance that one of two equal coefficients is called different
+TOOLS = frozenset({PLANE_BEFORE.name, SPEED_CORRECTION.name})  # of one recording, and no physics
 Status = Literal["missing", "superfluous", "different", "same"]
 Value = tuple[float, float]
 """A coefficient and its deviation."""
@@ -101,15 +103,18 @@ def compare(fitter: Fitter, own: Explanation, other: Side) -> Comparison:
 
     Where forces follow a measured speed, both are told at the recordings' own.
     """
+    # A speed taken as it was measured says nothing of what changes it.
+    untold = SURGE if all(other.values.get(name) == (value, 0.0) for name, value in SURGE.items()) else {}
     is_speed_told = fitter.recordings[0].has_speed and other.values["u0"][0] > 0.0
     if is_speed_told and "speed_loss" in own.names | other.names:
         other = at_speed(other, fitter.held["u0"])
+    other = replace(other, names=other.names - TOOLS)
     joint = _in_words_of(fitter, own, other)
     free = fitter.free(joint.names)
     is_free = dict(zip(joint.fit.structure.names, free.tolist(), strict=True))
     recorded = _values(joint)
     effects = []
-    for name in joint.names:
+    for name in joint.names - TOOLS:
         mine = _of(name, recorded)
         worth = fitter.polished(fitter.shrunk(joint, name)).bic - joint.bic
         if name not in other.names:
@@ -118,7 +123,7 @@ def compare(fitter: Fitter, own: Explanation, other: Side) -> Comparison:
             )
             continue
         given = _of(name, other.values)
-        compared = [key for key in given if is_free[key]]
+        compared = [key for key in given if is_free[key] and key not in untold]
         cost = _cost(fitter, joint, {key: given[key] for key in compared}) / _doubt(mine, given, compared)
         status: Status = "same"
         if cost > chi2.isf(SIGNIFICANCE, max(len(compared), 1)):

@@ -11,6 +11,7 @@ from typing import Literal
 
 from host.catalogue import BY_NAME, FAINT, ORDINARY
 from host.catalogue.kin import OFFSETS
+from host.catalogue.nuisance import SPEED_CORRECTION
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.leftover import SEA_DOUBT, Leftover
 from host.diagnosis.minute import minute_in
@@ -26,6 +27,7 @@ BY_SPEED = (
     " The errors of the measured speed lead a free run away from the recording, as small random forces "
     "would, most of all that of a hull which is unstable by itself; as such they are part of the noise model."
 )
+CORRECTED = " The model corrects the measured speed, which errs, by the surge equation (speed_correction)."
 CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
 
 
@@ -80,7 +82,12 @@ def _doubt(explanation: Explanation, waves: float) -> str:
 
 
 def remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit, waves: float = inf) -> str:
-    """What the explanation leaves, in words."""
+    """What the explanation leaves, in words, and what the model does about the sensors."""
+    corrected = CORRECTED * (SPEED_CORRECTION.name in best.names)
+    return _remaining(verdict, best, left, after, waves) + corrected
+
+
+def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit, waves: float) -> str:
     sea = (BY_SPEED if left.is_by_speed else BY_SEA) * best.fit.has_process_noise
     if verdict == "no_mismatch":
         return "Nothing is missing from the base model on this recording." + sea

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,11 +10,17 @@ from scipy.integrate import solve_ivp
 
 from host.catalogue import structure_of
 from host.catalogue.nuisance import SPEED_CORRECTION
+from host.diagnosis.comparison import Side, compare, side_of
+from host.diagnosis.diagnose import diagnose
 from host.diagnosis.explanation import Explanation
+from host.diagnosis.files import write_extended_model
 from host.diagnosis.fitter import SURGE, Fitter
+from host.diagnosis.given_model import against_model
 from host.diagnosis.unknown_physics import known_in
+from host.model import read_model
 from host.propagate import free_run, inputs_of
 from host.recording import Array, Recording
+from host.vehicle import default_vehicle
 from tests.diagnosis.hidden_dive import BASE, hidden_dive
 
 RECOVERY, DRAG = 4.0, 8.0  # s, m/s^2/rad^2
@@ -73,6 +80,26 @@ def test_the_surge_equation_tells_what_a_noisy_sensor_does_not() -> None:
 def test_a_correction_is_no_physics_and_is_not_named() -> None:
     _, _, corrected = explained(0.1)
     assert known_in(corrected) == ["speed_loss"]
+
+
+def test_it_is_told_and_kept_in_the_model_which_lacks_nothing(tmp_path: Path) -> None:
+    found = diagnose([slowing(0.1)])
+    assert found.verdict == "explained"
+    assert [effect.name for effect in found.effects] == ["speed_loss"]
+    assert SPEED_CORRECTION.name in found.remaining
+    write_extended_model(found, default_vehicle(), tmp_path / "model.json")
+    model = read_model(tmp_path / "model.json")
+    assert SPEED_CORRECTION.name in {effect["name"] for effect in model.effects}
+    assert against_model(found, model, "model.json").found.verdict == "no_mismatch"
+
+
+def test_a_model_of_a_speed_taken_as_it_was_measured_says_nothing_of_what_changes_it() -> None:
+    fitter, taken, corrected = explained(0.1)
+    found = compare(fitter, corrected, side_of(taken))
+    assert [(effect.name, effect.status) for effect in found.effects] == [("speed_loss", "same")]
+    other = {**side_of(corrected).values, "c_ud": (0.1 * DRAG, 0.0)}
+    differs = compare(fitter, corrected, Side(names=CORRECTED, values=other))
+    assert [(effect.name, effect.status) for effect in differs.effects] == [("speed_loss", "different")]
 
 
 def test_it_is_asked_only_of_a_speed_whose_errors_matter_beside_a_loss_of_it() -> None:
