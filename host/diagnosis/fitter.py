@@ -68,8 +68,8 @@ class Fitter:
         self.held = dict(HELD)
         if recordings[0].has_speed:
             self.held["u0"] = mean_speed(recordings)
-            # Where the speed is measured its loss is data, and there is nothing in it to estimate.
-            self.held |= SURGE | {"speed_step": 0.0, "speed_change_time": 0.0}
+            # Where the speed is measured its change is data, and there is nothing in it to estimate.
+            self.held |= {"speed_step": 0.0, "speed_change_time": 0.0}
         else:
             self.held["ground_share"] = 0.0
         self.held |= dict.fromkeys(SPANS.values(), max(float(r.time[-1]) for r in recordings))
@@ -216,9 +216,9 @@ class Fitter:
         return Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0]))
 
     def held_in(self, names: Names) -> dict[str, float]:
-        """What is held in a set: of the surge equation nothing where it corrects the measured speed."""
-        is_corrected = SPEED_CORRECTION.name in names
-        return {name: value for name, value in self.held.items() if not (is_corrected and name in SURGE)}
+        """What is held in a set: of a measured speed the surge equation, too, unless it corrects that."""
+        is_taken = self.recordings[0].has_speed and SPEED_CORRECTION.name not in names
+        return SURGE | self.held if is_taken else self.held
 
     def tools_beside(self, names: Names) -> tuple[str, ...]:
         """What a set needs that is no physics: the plane's angle before, and errors of a measured speed."""

@@ -163,7 +163,7 @@ def may_be_bent(fitter: "Fitter", parent: Explanation) -> bool:
 def guess(fitter: "Fitter", start: Point, names: Names) -> Point:
     """The rough values of regression where it gives some, `start` elsewhere, moved into their valley."""
     rough = first_guess(fitter.thinned, fitter.speed, names)
-    rough = {name: value for name, value in rough.items() if name not in fitter.held}
+    rough = {name: value for name, value in rough.items() if name not in fitter.held_in(names)}
     own = zip(start.structure.names, start.parameters, strict=True)
     values = np.array([rough.get(name, value) for name, value in own])
     point = Point(start.structure, values, start.initial, np.array([*fitter.floor, 0.0, 0.0]))
