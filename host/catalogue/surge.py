@@ -10,25 +10,23 @@ MINUTE = 60.0  # s
 
 def _speed_loss(c: Chain) -> None:
     change, known, before = c.extra["speed_loss"], c.is_speed_known, c.speed
-    c.speed = before + change * (1 - known)
-    if "speed_gain" in c.p:
-        c.speed = (c.p["u0"] + change) * known + c.speed * (1 - known)
+    is_corrected = "speed_gain" in c.p
+    # Counted from u0 where a measured speed is corrected; else what is measured stays as it is.
+    c.speed = before + change * (1 - known) + (c.p["u0"] + change - before) * known * is_corrected
     c.speed_ratio = c.speed / c.p["u0"]
-    force = (
-        -c.p["c_ud"] * (c.speed_ratio * c.plane) ** 2
+    balance = c.extra["balance"] * known if is_corrected else 0
+    rate = (
+        -(change - balance) * (1 + c.speed_ratio) / 2 / c.p["speed_time"]
+        - c.p["c_ud"] * (c.speed_ratio * c.plane) ** 2
         # Both are known per heave mass; c_uq makes them accelerations of the surge mass.
         - c.p["c_uq"] * (c.w * c.q + net_weight(c) * ca.sin(c.theta))
     )
-    beyond = change - c.extra["balance"] * known if "speed_gain" in c.p else change
-    rate = force - beyond * (1 + c.speed_ratio) / 2 / c.p["speed_time"]
-    if "speed_gain" in c.p:
+    if is_corrected:
         error = (before - c.speed) * known
         c.rates["balance"] = error / MINUTE
-        rate = rate + c.p["speed_gain"] * error
-        c.surge = rate
-    else:
-        c.surge = c.surge + rate * (1 - known)
+        rate += c.p["speed_gain"] * error
     c.rates["speed_loss"] = rate
+    c.surge = rate if is_corrected else c.surge + rate * (1 - known)
 
 
 def _begins(c: Chain) -> ca.SX:
