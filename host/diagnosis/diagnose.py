@@ -17,7 +17,7 @@ from host.diagnosis.leftover import Leftover
 from host.diagnosis.locate import Location, locate
 from host.diagnosis.minute import LEAST_ANGLE, minute_in
 from host.diagnosis.plane_choice import Way, by_single_effects, is_likelier, ways
-from host.diagnosis.scoring import Misfit, free_run_errors, misfit
+from host.diagnosis.scoring import Misfit, foretells, free_run_errors, misfit
 from host.diagnosis.sea_fits import WAVES, again_in_waves, again_under_forces, with_regular_waves
 from host.diagnosis.search import Search
 from host.diagnosis.seas import Explained, Waves, evidence
@@ -190,7 +190,9 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
     if waves is not None and WAVES not in best.names:
         effects.append(NamedEffect(name=WAVES, delta_bic=waves.delta_bic))
     effects.sort(key=lambda effect: -effect.delta_bic)
-    verdict = verdict_on(model, left, before, after, evidence(waves))
+    is_astray = best.fit.has_process_noise and waves is None and horizon is None and after.chi2 > before.chi2
+    is_told = not is_astray or foretells(search.base, best, spans, floor, HORIZON)
+    verdict = verdict_on(model, left, before, after, evidence(waves), is_told)
     return Judged(before, after, effects, verdict, _slots(search, best, effects, verdict))
 
 

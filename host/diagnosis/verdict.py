@@ -32,11 +32,17 @@ CANCELLED = 0.95  # of an offset by another: by chance both channels do so once 
 
 
 def verdict_on(
-    best: Explanation, left: Leftover, before: Misfit, after: Misfit, waves: float = inf
+    best: Explanation,
+    left: Leftover,
+    before: Misfit,
+    after: Misfit,
+    waves: float = inf,
+    foretells: bool = True,
 ) -> Verdict:
     """Of an explanation, by what it leaves and how far it betters the base on held-out spans.
 
-    waves  by how much of BIC those it was found among, if any, are likelier than no waves
+    waves      by how much of BIC those it was found among, if any, are likelier than no waves
+    foretells  whether it foretells the next seconds there better than the base, if no free run can tell
     """
     if left.is_nothing and not best.names:
         return "no_mismatch"
@@ -45,7 +51,7 @@ def verdict_on(
     if left.is_nothing and after.chi2 < WORSE and best.names == minute_in(best):
         return "no_mismatch"
     if left.is_nothing and after.chi2 < worst and not unknown_in(best):
-        return "partly_explained" if _doubt(best, waves) else "explained"
+        return "explained" if foretells and not _doubt(best, waves) else "partly_explained"
     return "partly_explained" if known_in(best) and after.chi2 < 0.7 * before.chi2 else "unexplained"
 
 

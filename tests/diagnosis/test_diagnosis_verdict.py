@@ -57,6 +57,13 @@ def test_verdict(
     assert verdict_on(named(base, *names), left, misfit(5.0), misfit(after)) == verdict
 
 
+def test_what_foretells_nothing_better_has_not_explained_it(base: Explanation) -> None:
+    found = named(base, RARE[0])
+    for foretells, verdict in ((True, "explained"), (False, "partly_explained")):
+        assert verdict_on(found, leftover(), misfit(7.0), misfit(6.0), foretells=foretells) == verdict
+    assert "does not hold" in remaining("partly_explained", found, leftover(), misfit(6.0))
+
+
 def test_many_effects_that_few_vehicles_have_are_doubted_by_name(base: Explanation) -> None:
     crowd = named(base, *COMMON, *RARE)
     assert sorted(rare_in(crowd)) == sorted(RARE)

@@ -9,11 +9,13 @@ from hidden_dive import hidden_dive
 from host.catalogue import structure_of
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.scoring import misfit
+from host.diagnosis.scoring import foretells, misfit
+from host.diagnosis.sea_fits import with_sea
 from host.diagnosis.spans import divide
 from host.equations import NAMES
 from host.noise_floor import noise_floor
 from host.propagate import free_run, inputs_of
+from host.recording import Array
 
 
 def test_a_run_that_leaves_the_numbers_is_as_far_off_as_can_be() -> None:
@@ -49,3 +51,22 @@ def test_among_random_forces_a_lost_speed_arrives_where_it_is_judged() -> None:
     after = misfit(Explanation(names, truth, 0.0), spans, floor)
     assert after.chi2_depth < 1.5
     assert after.chi2_pitch < 1.5
+
+
+def test_among_random_forces_only_what_acts_foretells_the_next_seconds_better() -> None:
+    gusts = 0.1 * np.random.default_rng(2).standard_normal(1001)
+
+    def turned(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+        return float(gusts[int(10.0 * time)]), 3.0 * x[0], 0.0
+
+    recording = hidden_dive(turned, duration=100.0)
+    spans, floor = divide([recording]), noise_floor([recording])
+    fitter = Fitter(spans.teaching)
+    base = with_sea(fitter, fitter.base)
+    acting, idle = (
+        fitter.polished(fitter.grown(base, name, []))
+        for name in ("munk_moment", "heave_quadratic_drag")
+    )
+    assert base.fit.has_process_noise
+    assert foretells(base, acting, spans, floor, 5.0)
+    assert not foretells(base, idle, spans, floor, 5.0)
