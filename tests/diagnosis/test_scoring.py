@@ -64,8 +64,7 @@ def test_among_random_forces_only_what_acts_foretells_the_next_seconds_better() 
     fitter = Fitter(spans.teaching)
     base = with_sea(fitter, fitter.base)
     acting, idle = (
-        fitter.polished(fitter.grown(base, name, []))
-        for name in ("munk_moment", "heave_quadratic_drag")
+        fitter.polished(fitter.grown(base, name, [])) for name in ("munk_moment", "heave_quadratic_drag")
     )
     assert base.fit.has_process_noise
     assert foretells(base, acting, spans, floor, 5.0)
