@@ -122,7 +122,7 @@ def coloured_noise(start: Fit, inputs: list[Inputs], most_steps: int = 15) -> Fi
     noise = end.point.noise
     at_end = end.point.with_noise(np.array([*noise[:2], 0.0, 0.0]))
     fit = finished(at_end, white, inputs, start.free, end.likelihood, used, converged)
-    return replace(fit, wander=np.column_stack([noise[2:4], noise[4:]]))
+    return replace(fit, wander=np.array([noise[[2, 4]], noise[[3, 5]], [0.0, 0.0]]))
 
 
 def _filtered(

@@ -1,6 +1,6 @@
 """The maximum of the likelihood over recordings, and what it says of its own accuracy."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +9,8 @@ from host.equations import Structure
 from host.gauss_newton import GaussNewton, Mask, Point
 from host.propagate import NX0, Inputs
 from host.recording import Array
+
+NO_WANDER = np.zeros((3, 2))
 
 
 class Rival(NamedTuple):
@@ -29,7 +31,7 @@ class Fit:
     noise        (4,) variances of pitch rad^2, depth m^2; densities of unknown heave, pitch acceleration,
                  or of what stands for them among waves
     wander       variance and correlation time s of the part of each sensor's error, pitch and depth, that
-                 wanders (2, 2); zero where all of it is white
+                 wanders, and of a vertical current (3, 2), see host.drift; zero where there is none
     waves        frequency rad/s and damping ratio of the waves, and what else host.waves tells of them, (5,);
                  zero where there are none
     deviance     -2 log-likelihood at these noise levels, but for what depends on them alone: the sum of the
@@ -52,7 +54,7 @@ class Fit:
     deviance: float
     iterations: int
     converged: bool
-    wander: Array = field(default_factory=lambda: np.zeros((2, 2)))
+    wander: Array = field(default_factory=lambda: NO_WANDER)
     waves: Array = field(default_factory=lambda: np.zeros(5))
     rivals: tuple[Rival, ...] = ()
 
@@ -70,11 +72,20 @@ class Fit:
         return bool(self.wander.any())
 
     @property
+    def relative_wander(self) -> Array:
+        """What wanders with its variances in units of the white noise of the sensor it shows in (3, 2)."""
+        return np.asarray(self.wander / np.column_stack([self.noise[[0, 1, 1]], np.ones(3)]))
+
+    def with_wander(self, relative: Array) -> "Fit":
+        """The same fit, said to have been found beside what wanders so."""
+        return replace(self, wander=relative * np.column_stack([self.noise[[0, 1, 1]], np.ones(3)]))
+
+    @property
     def noise_levels(self) -> int:
         """How many numbers describe the noise."""
         if self.has_process_noise:
             return 7 if self.waves.any() else 4
-        return 6 if self.has_coloured_noise else 2
+        return 2 + 2 * int(np.count_nonzero(self.wander[:, 0]))
 
     @property
     def bic(self) -> float:

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from host.coloured_noise import coloured_noise
+from host.drift import whitenings
 from host.equations import BASE, Structure
 from host.filter_error import filter_error
 from host.fit import Fit
@@ -61,7 +62,7 @@ def fit_maximum_likelihood(
     errors, steps = speed_errors(recordings, floor[1], resolution(recordings))
     told = thinned(recordings, steps)
     inputs = [
-        inputs_of(recording, structure, steps=steps, speed_error=error)
+        inputs_of(recording, structure, steps=steps, whitening=whitenings(None, error))
         for recording, error in zip(told, errors, strict=True)
     ]
     if starts is None:
@@ -84,7 +85,7 @@ def fit_maximum_likelihood(
         return with_rivals(best, others)
     on_progress("random forces, wandering sensors, waves")
     plain, rows = best, zip(thinned(recordings), errors, strict=True)
-    inputs = [inputs_of(recording, structure, speed_error=error) for recording, error in rows]
+    inputs = [inputs_of(r, structure, whitening=whitenings(None, error)) for r, error in rows]
     if steps.any():  # a filter takes errors for normal: it is compared with a free run that does, too
         start = Point(structure, best.parameters, best.initial, best.noise)
         plain = output_error(start, inputs, free)

@@ -11,6 +11,7 @@ from host.catalogue import BY_NAME, UNKNOWN, named, structure_of
 from host.catalogue.nuisance import SPEED_CORRECTION
 from host.equations import NAMES, PARAMETERS, Structure
 from host.errors import RecordingError
+from host.fit import NO_WANDER
 from host.recording import Array, Recording
 from host.version import program_version
 
@@ -76,9 +77,12 @@ def model_of(
         named = {"pitch_rad": float(np.sqrt(noise[0])), "depth_m": float(np.sqrt(noise[1]))}
         if noise[2:].any():
             named |= {"heave_force_density": float(noise[2]), "pitch_moment_density": float(noise[3])}
-    if wander is not None and wander.any():
-        for (sensor, unit), (variance, time) in zip((("pitch", "rad"), ("depth", "m")), wander, strict=True):
-            named |= {f"{sensor}_wander_{unit}": float(np.sqrt(variance)), f"{sensor}_wander_s": float(time)}
+    wandering = (("pitch", "rad"), ("depth", "m"), ("current", "mps"))
+    for (what, unit), (variance, time) in zip(
+        wandering, NO_WANDER if wander is None else wander, strict=True
+    ):
+        if variance > 0.0:
+            named |= {f"{what}_wander_{unit}": float(np.sqrt(variance)), f"{what}_wander_s": float(time)}
     valid_range = {}
     channels = dict(pitch_rad="pitch", rudder_rad="rudder", depth_m="depth", speed_mps="speed")
     for key, name in channels.items():

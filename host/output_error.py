@@ -136,22 +136,23 @@ def _free_runs(point: Point, inputs: list[Inputs]) -> list[Run]:
 def _errors(runs: list[Run], inputs: list[Inputs]) -> list[Array]:
     with np.errstate(invalid="ignore"):  # a trial that runs away is infinite, and refused for it
         errors = [one.present * (one.measured - run.outputs) for run, one in zip(runs, inputs, strict=True)]
-    return [_less_speed_error(error, one) for error, one in zip(errors, inputs, strict=True)]
+    return [_less_drift(error, one) for error, one in zip(errors, inputs, strict=True)]
 
 
-def _less_speed_error(values: Array, inputs: Inputs) -> Array:
-    """Residuals (2, N) or sensitivities (2, c, N) with what the speed's errors do to depth whitened."""
-    if inputs.speed_error is not None:
-        depth = np.atleast_2d(values[1])
-        with np.errstate(invalid="ignore", over="ignore"):
-            values[1] = inputs.present[1] * inputs.speed_error.whitened(depth).reshape(values[1].shape)
+def _less_drift(values: Array, inputs: Inputs) -> Array:
+    """Residuals (2, N) or sensitivities (2, c, N) with what drifts in either channel whitened."""
+    for i, whitening in enumerate(inputs.whitening):
+        if whitening is not None:
+            channel = np.atleast_2d(values[i])
+            with np.errstate(invalid="ignore", over="ignore"):
+                values[i] = inputs.present[i] * whitening.whitened(channel).reshape(values[i].shape)
     return values
 
 
 def _innovations(point: Point, runs: list[Run], inputs: list[Inputs]) -> list[tuple[Array, Array]]:
     each = zip(_errors(runs, inputs), runs, point.initial, inputs, strict=True)
     return [
-        (error, _less_speed_error(sensitivities(point.parameters, x0, one, run), one))
+        (error, _less_drift(sensitivities(point.parameters, x0, one, run), one))
         for error, run, x0, one in each
     ]
 
@@ -204,5 +205,5 @@ def _likeliest_noise(errors: list[Array], inputs: list[Inputs]) -> tuple[Array, 
         known = [error[i, one.present[i] > 0.0] for error, one in zip(errors, inputs, strict=True)]
         deviation, costs[i] = likeliest_deviation(np.concatenate(known), steps[i])
         variance[i] = deviation**2 + steps[i] ** 2 / 12.0
-    charge = sum(one.speed_error.charge for one in inputs if one.speed_error is not None)
+    charge = sum(each.charge for one in inputs for each in one.whitening if each is not None)
     return variance, float(np.sum(costs)) + charge

@@ -12,11 +12,11 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
+from host.drift import NOT_WHITENED, Whitenings
 from host.equations import BASE, STATES, Chain, Structure
 from host.over_rows import KEPT, over_rows
 from host.recording import Array, Recording
 from host.speed import smoothed_speed
-from host.speed_error import SpeedError
 
 NX0 = len(STATES)
 MOST_SUBSTEPS = 8  # slow records show no modes faster than their sampling: finer steps would resolve nothing
@@ -34,7 +34,7 @@ class Inputs:
     measured  (2, N) pitch rad and depth m, 0 where missing
     present   (2, N) 1 where measured, else 0
     steps     (2,) of the rounding of pitch and depth where it rules, else 0
-    speed_error  what errors of the measured speed do to depth, where it matters
+    whitening  of pitch and of depth, where more than white noise is in them
     """
 
     structure: Structure
@@ -43,7 +43,7 @@ class Inputs:
     present: Array
     substeps: int
     steps: Array = field(default_factory=lambda: np.zeros(2))
-    speed_error: SpeedError | None = None
+    whitening: Whitenings = NOT_WHITENED
 
 
 def inputs_of(
@@ -51,7 +51,7 @@ def inputs_of(
     structure: Structure = BASE,
     longest_substep: float = LONGEST_SUBSTEP,
     steps: Array | None = None,
-    speed_error: SpeedError | None = None,
+    whitening: Whitenings = NOT_WHITENED,
 ) -> Inputs:
     """Inputs of one recording. Longer sub-steps (s) suit vehicles whose modes are known to be slow."""
     intervals = recording.intervals
@@ -76,7 +76,7 @@ def inputs_of(
         present=present.astype(float),
         substeps=int(np.ceil(recording.step / max(longest_substep, recording.step / MOST_SUBSTEPS) - 1e-6)),
         steps=steps,
-        speed_error=speed_error,
+        whitening=whitening,
     )
 
 

@@ -4,13 +4,15 @@ from collections.abc import Callable
 
 from host.catalogue import UNKNOWN
 from host.catalogue.nuisance import FREE_TRIM
+from host.diagnosis.drifts import again_in_drift, among_drift, in_drift
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
-from host.diagnosis.margins import LARGEST_SET, LITTLE
+from host.diagnosis.margins import LARGEST_SET, LITTLE, NAMING_MARGIN
 from host.diagnosis.plane_choice import Way
 from host.diagnosis.pruning import leanest
 from host.diagnosis.rarity import told_by_the_usual
+from host.diagnosis.sea_fits import as_filtered
 from host.diagnosis.search import Search
 from host.diagnosis.seas import (
     Explained,
@@ -38,13 +40,22 @@ def explain(
     if part is not None and part.left.is_by_speed:
         return again_astray(fitter, workers, on_progress, part)
     known = None if part is None else part.search
+    if part is not None and part.best.fit.has_coloured_noise:
+        return again_in_drift(fitter, workers, on_progress, part)
     search = Search(fitter, workers, on_progress, fitter.base, fitter.root, known, way.alone)
     waves = way.waves if part is None else None
+    search.asks_drift = waves is None
     plain = None if waves is None else in_plain_waves(search, waves)
     # What waves and a few effects explain needs no dozen effects without waves.
     search.is_for_few = plain is not None and plain.left.is_nothing
     again = [fitter.refitted(one) for one in _found_in(part)] if part else _alike(fitter, like)
     best = search.run(again)
+    drift = None if search.adrift is None else in_drift(search, search.adrift)
+    if drift is not None and drift.left.is_nothing:
+        return drift
+    if search.adrift is not None:
+        search = Search(fitter, workers, on_progress, fitter.base, fitter.root, alone=search.alone_so_far())
+        best = search.run(again)
     left, told = leftover(fitter, best), None
     if waves is not None and plain is not None:
         plain = against(plain, waves, best)
@@ -71,6 +82,10 @@ def explain(
         if part is None or part.waves is not None:
             search, best, told = among_waves(search, best, calm)
         left = leftover(fitter, best if told is None else told.fitted)
+        if told is None and not left.is_by_speed:
+            drift = drift or among_drift(search, best)
+            if drift is not None and drift.best.bic < as_filtered(fitter, best).bic - NAMING_MARGIN:
+                return drift
     if told is None and (lean := leanest(search, best)) is not best:
         best, left = lean, leftover(fitter, lean)
     return Explained(best, search, left, told)

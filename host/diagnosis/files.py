@@ -119,5 +119,6 @@ def write_extended_model(found: Diagnosis, vehicle: Vehicle, path: Path) -> None
         {name: found.std[name] for name in NAMES},
         fit.noise,
         effects,
+        fit.wander,
     )
     write_model(model, path)

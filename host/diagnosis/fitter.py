@@ -16,9 +16,10 @@ from host.diagnosis.first_guess import accelerations
 from host.diagnosis.spans import ALARM_LATE
 from host.diagnosis.starts import guess, idle, is_far, scanned, starts_again, starts_of
 from host.diagnosis.trims import HELD, trimmed
+from host.drift import drifts_of, whitenings
 from host.equations import NAMES, Effect
 from host.filter_error import filter_error_from
-from host.fit import Fit
+from host.fit import NO_WANDER, Fit
 from host.gauss_newton import Mask, Point
 from host.maximum_likelihood import fit_maximum_likelihood
 from host.noise_floor import noise_floor, resolution
@@ -55,15 +56,24 @@ class Fitter:
     known    an explanation of other stretches of the same vehicle; without one the base model is fitted
     steps    (2,) of rounding, where it rules pitch and depth
     thinned  the recordings for what takes errors for normal
+    speed_errors  how those of a measured speed make depth drift, where that matters
+    wander   (3, 2) of what else drifts (host.drift), variances in units of the white noise: as in `known`
     candidates  entries of the catalogue that are tried: what changes at one moment after an alarm only
     """
 
     def __init__(self, recordings: list[Recording], known: Explanation | None = None) -> None:
         self.floor = noise_floor(recordings)
         self.recordings = recordings
-        self._speed_errors, self.steps = speed_errors(recordings, self.floor[1], resolution(recordings))
+        self.speed_errors, self.steps = speed_errors(recordings, self.floor[1], resolution(recordings))
+        self.wander = NO_WANDER if known is None else known.fit.relative_wander
+        if self.wander.any():
+            self.steps = NO_STEPS  # what drifts takes errors for normal, as a filter does
         self.thinned = thinned(recordings)
         self._told = thinned(recordings, self.steps)
+        self._whitenings = [
+            whitenings(*drifts_of(recording, error, self.wander))
+            for recording, error in zip(self._told, self.speed_errors, strict=True)
+        ]
         self.accelerations = accelerations(self.thinned)
         self.held = dict(HELD)
         if recordings[0].has_speed:
@@ -223,7 +233,7 @@ class Fitter:
     def tools_beside(self, names: Names) -> tuple[str, ...]:
         """What a set needs that is no physics: the plane's angle before, and errors of a measured speed."""
         remembers = any(has_memory(named(name)) for name in names)
-        is_astray = "speed_loss" in names and any(error is not None for error in self._speed_errors)
+        is_astray = "speed_loss" in names and any(error is not None for error in self.speed_errors)
         return (PLANE_BEFORE.name,) * remembers + (SPEED_CORRECTION.name,) * is_astray
 
     def free(self, names: Names) -> Mask:
@@ -250,15 +260,17 @@ class Fitter:
         structure, steps = structure_of(names), NO_STEPS if for_filter else self.steps
         kind = structure.needs_lags, for_filter
         if kind not in self._inputs:
-            rows = zip(self.thinned if for_filter else self._told, self._speed_errors, strict=True)
+            rows = zip(self.thinned if for_filter else self._told, self._whitenings, strict=True)
             self._inputs[kind] = [
-                inputs_of(recording, structure, self._longest_substep, steps, error)
-                for recording, error in rows
+                inputs_of(recording, structure, self._longest_substep, steps, whitening)
+                for recording, whitening in rows
             ]
         return [replace(one, structure=structure) for one in self._inputs[kind]]
 
     def explained(self, names: Names, fit: Fit) -> Explanation:
         """The fit of a set, with what the set is charged."""
+        if self.wander.any() and not fit.has_process_noise:
+            fit = fit.with_wander(self.wander)
         return Explanation(names, fit, self.bic(fit, names))
 
     def point(

@@ -73,7 +73,7 @@ def leftover(fitter: Fitter, best: Explanation) -> Leftover:
     by_chance = chi2.isf(SIGNIFICANCE, len(ANY_SMOOTH_FORCE.parameters))
     is_by_speed = are_by_speed(fitter, fit)
     slack = COLOUR if fit.waves.any() or is_by_speed else 0.0
-    doubt = SEA_DOUBT if fit.has_process_noise else 1.0
+    doubt = SEA_DOUBT if fit.has_process_noise or fit.has_coloured_noise else 1.0
     is_sea = fit.waves.any() or _heave_by_sea(fit) >= LEAST_SEA
     return Leftover(
         is_coloured=not all(is_white(e, 20, SIGNIFICANCE, slack) and is_even(e, slack) for e in innovations),

@@ -7,6 +7,8 @@ import numpy as np
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.foretold import following, foretold_errors
 from host.diagnosis.spans import Spans
+from host.drift import drifts_of, whitenings
+from host.fit import Fit
 from host.predict import SETTLING_SPAN, estimate_initial_state
 from host.propagate import Run, free_run, inputs_of
 from host.recording import Array, Recording
@@ -17,7 +19,10 @@ FORETOLD = 0.9  # of the squared error that is left: less than a tenth better is
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misfit:
-    """Errors of free runs; chi2 is the mean square over the sensors' noise variance."""
+    """Errors of free runs; chi2 is the mean square over the sensors' noise variance.
+
+    Where something drifts beside that noise, over the variance of both.
+    """
 
     depth_rmse_m: float
     pitch_rmse_rad: float
@@ -59,24 +64,32 @@ def misfit(explanation: Explanation, spans: Spans, floor: Array, horizon: float 
 
     The free run of the fit passes through the stretches that were held out, so that lags and the speed arrive
     there as they are. Where random forces act it would stray from any truth: there a Kalman filter follows
-    what was taught, and runs freely over what was held out. Where recordings judge as a whole it begins anew.
+    what was taught, and runs freely over what was held out; so does one for what drifts beside the vehicle.
+    Where recordings judge as a whole it begins anew.
 
     horizon  s over which each stretch is foretold instead
     """
     if horizon is not None:
         errors = [foretold_errors(explanation, one, horizon) for one in spans.judging or spans.teaching]
     elif spans.unseen:
-        errors = _errors_passing(explanation, spans)
+        errors, doubts = _errors_passing(explanation, spans)
     else:
         errors = [free_run_errors(explanation, piece, np.inf) for piece in spans.judging or spans.teaching]
-    with np.errstate(over="ignore", invalid="ignore"):
-        pitch, depth = np.nan_to_num(np.nanmean(np.hstack(errors) ** 2, axis=1), nan=1e12, posinf=1e12)
+    if horizon is not None or not spans.unseen:
+        doubts = [np.ones_like(error) for error in errors]
+    pitch, depth = _mean_squares(np.hstack(errors))
+    whitened = _mean_squares(np.hstack(errors) / np.sqrt(np.hstack(doubts)))
     return Misfit(
         depth_rmse_m=float(np.sqrt(depth)),
         pitch_rmse_rad=float(np.sqrt(pitch)),
-        chi2_depth=float(depth / floor[1]),
-        chi2_pitch=float(pitch / floor[0]),
+        chi2_depth=float(whitened[1] / floor[1]),
+        chi2_pitch=float(whitened[0] / floor[0]),
     )
+
+
+def _mean_squares(errors: Array) -> Array:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(np.nan_to_num(np.nanmean(errors**2, axis=1), nan=1e12, posinf=1e12))
 
 
 def foretells(base: Explanation, best: Explanation, spans: Spans, floor: Array, horizon: float) -> bool:
@@ -88,9 +101,10 @@ def foretells(base: Explanation, best: Explanation, spans: Spans, floor: Array, 
     return after < FORETOLD * before
 
 
-def _errors_passing(explanation: Explanation, spans: Spans) -> list[Array]:
+def _errors_passing(explanation: Explanation, spans: Spans) -> tuple[list[Array], list[Array]]:
+    """Of each recording, with the variance of what drifts and of white noise in units of the latter."""
     fit = explanation.fit
-    errors = []
+    errors, doubts = [], []
     for run, unseen, initial in zip(spans.teaching, spans.unseen, fit.initial, strict=True):
         inputs = inputs_of(run, fit.structure)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -98,9 +112,24 @@ def _errors_passing(explanation: Explanation, spans: Spans) -> list[Array]:
                 passed = steered_run(fit.parameters, initial, inputs, following(fit, initial, inputs))
             else:
                 passed = free_run(fit.parameters, initial, inputs)
+        drifted, doubt = _drifted(fit, run, passed)
         # A run that leaves the numbers is as far off as can be, not only as far as it can be followed.
-        errors.append(np.vstack([unseen.pitch, unseen.depth]) - _known(passed, np.inf))
-    return errors
+        errors.append(np.vstack([unseen.pitch, unseen.depth]) - _known(passed, np.inf) - drifted)
+        doubts.append(doubt)
+    return errors, doubts
+
+
+def _drifted(fit: Fit, taught: Recording, passed: Run) -> tuple[Array, Array]:
+    """How far pitch and depth have drifted, as far as what was taught tells, and how far that may be off.
+
+    (2, N) each; the second is a variance in units of the sensor's white noise, which it includes.
+    """
+    left = np.nan_to_num(np.vstack([taught.pitch, taught.depth]) - passed.outputs)
+    foreseen, doubt = np.zeros_like(left), np.ones_like(left)
+    for i, filtered in enumerate(whitenings(*drifts_of(taught, None, fit.relative_wander))):
+        if filtered is not None:
+            foreseen[i], doubt[i] = filtered.foreseen(left[i : i + 1])[0], filtered.doubt
+    return foreseen, doubt
 
 
 def _known(run: Run, lost: float) -> Array:

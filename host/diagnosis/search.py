@@ -27,7 +27,7 @@ from host.diagnosis.offset_choice import with_best_offsets, with_likeliest_offse
 from host.diagnosis.prospects import gain
 from host.diagnosis.pruning import pruned
 from host.diagnosis.rarity import told_by_the_usual
-from host.diagnosis.together import completed, together
+from host.diagnosis.together import completed, together, with_more
 from host.diagnosis.whole_vehicle import whole, with_all_ordinary
 from host.diagnosis.workers import Task, Workers
 from host.recording import Array
@@ -55,6 +55,7 @@ class Search:
     joint   sets with all that every vehicle has
     steered  what a continuation found likeliest while forces still steered the state; `at_sea` the same
              among those that are likeliest beside it, once asked
+    asks_drift  whether something may drift beside white noise; `adrift` a set beside that, where it is plain
     is_for_few  not for all that every vehicle has at once: something else explains the recordings
     """
 
@@ -71,6 +72,8 @@ class Search:
     steered: Explanation | None = None
     at_sea: Explanation | None = None
     is_for_few: bool = False
+    asks_drift: bool = False
+    adrift: Explanation | None = None
     _shrunk: dict[Names, set[Names]] = field(default_factory=dict)  # those fitted from larger sets: which
     _polished: set[Names] = field(default_factory=set)  # those of them fitted to the end
     _completions: dict[tuple[Names, float], Explanation] = field(default_factory=dict)  # by set and BIC
@@ -87,7 +90,7 @@ class Search:
         foreign: Explanation | None = None
         for size in range(1, LARGEST_SET + 1):
             is_time = foreign is None and self._needs_many(beam[0], size)
-            if is_time and (together(self, beam[0]) is not None or self.follows_no_free_run):
+            if is_time and (together(self, beam[0]) is not None or self.is_led_elsewhere):
                 break
             grown = self.singles() if size == 1 else self._grown(beam, size)
             best_before = min(e.bic for e in beam)
@@ -105,9 +108,28 @@ class Search:
                 foreign = lone_form(self, beam[0])
                 if foreign is not None and self._is_only_flexible(foreign, beam[0]):
                     break
-        self.on_progress("settling")
-        if self.follows_no_free_run:
+        if self.is_led_elsewhere:
             return min((e for e in self.tried.values() if FREE_TRIM.name not in e.names), key=lambda e: e.bic)
+        return self._concluded()
+
+    def run_from(self, joint: Explanation) -> Explanation:
+        """The best explanation from a set of many: with what else promises most, pruned and exchanged."""
+        for explanation in (self.base, self.root, joint):
+            self.remember(explanation)
+        self.joint.add(joint.names)
+        self.remember(pruned(self, with_more(self, joint, least=0.0)))
+        return self._concluded()
+
+    def settle(self, best: Explanation) -> Explanation:
+        """A set that was found elsewhere, pruned and exchanged here."""
+        for explanation in (self.base, self.root, best):
+            self.remember(explanation)
+        self.on_progress("settling")
+        return self._settled(best)
+
+    def _concluded(self) -> Explanation:
+        """The best set with offsets in the place of its free trim, settled, and what only then shows."""
+        self.on_progress("settling")
         found = self._settled(with_best_offsets(self))
         best = told_by_the_usual(self, whole(self, completed(self, found)))
         return best if best is found else with_likeliest_offsets(self, best)
@@ -117,6 +139,10 @@ class Search:
         if self.alone:
             return [self.remember(explanation) for explanation in self.alone]
         return self._grown([self.remember(self.root)], 1)
+
+    def alone_so_far(self) -> tuple[Explanation, ...]:
+        """Each effect alone on top of the root, as far as these were fitted."""
+        return tuple(e for e in self.tried.values() if FREE_TRIM.name in e.names and len(e.names) == 2)
 
     def without(self, best: Explanation, name: str) -> Explanation:
         """The set less one member."""
@@ -305,6 +331,11 @@ class Search:
             return False
         left = min(self.fitter.excess(self.tried[names].fit) for names in self.joint)
         return bool(left > LOST and self.fitter.are_slight(self.steered.fit.noise))
+
+    @property
+    def is_led_elsewhere(self) -> bool:
+        """Whether no free run under white noise alone will tell."""
+        return self.follows_no_free_run or self.adrift is not None
 
     def is_hopeless(self, best: Explanation) -> bool:
         """Whether much is left although all that every vehicle has was tried at once."""

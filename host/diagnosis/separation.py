@@ -227,7 +227,7 @@ class _Flight:
 
     def confirmed(self) -> float:
         """BIC between the two once the named model has flown the manoeuvre with sensor noise."""
-        if self.named.fit.has_process_noise:
+        if self.named.fit.has_process_noise or self.named.fit.has_coloured_noise:
             return float("nan")  # a sea is not flown here
         rng = np.random.default_rng(0)
         noise = np.sqrt(self.named.fit.noise[:2])[:, None] * rng.standard_normal(self.outputs.shape)

@@ -12,6 +12,7 @@ from host.catalogue import ORDINARY
 from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.continuation import continued
+from host.diagnosis.drift_fits import plain_drift
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.leftover import is_above_floor
 from host.diagnosis.margins import FEW, LITTLE, MUCH, SMALL, margin
@@ -35,20 +36,25 @@ def together(search: "Search", leading: Explanation) -> Explanation | None:
     search.on_progress("what every vehicle has")
     fitter, best = search.fitter, with_ordinary(search, leading)
     if fitter.excess(best.fit) < MUCH:
-        best = _with_more(search, best)
+        best = with_more(search, best)
+    if search.asks_drift and fitter.excess(best.fit) > LITTLE:
+        search.on_progress("sensors that wander, gusts")
+        search.adrift = plain_drift(fitter, best)
+        if search.adrift is not None:
+            return None
     if fitter.excess(best.fit) > LITTLE and (end := _by_continuation(search)) is not None:
-        best = _with_more(search, min(end, best, key=lambda e: e.bic))
+        best = with_more(search, min(end, best, key=lambda e: e.bic))
     if fitter.excess(best.fit) > LITTLE and is_above_floor(fitter, best.fit):
         return None
     best = pruned(search, best)
     return best if best.bic < leading.bic else None
 
 
-def _with_more(search: "Search", best: Explanation) -> Explanation:
-    """The set with what else promises most, as long as much is left and it helps."""
+def with_more(search: "Search", best: Explanation, least: float = LITTLE) -> Explanation:
+    """The set with what else promises most, as long as more than the least is left and it helps."""
     left = search.fitter.excess(best.fit)
     for _ in range(MOST_BESIDE):
-        if left < LITTLE:
+        if left < least:
             break
         found = search.workers.results(_more(search, best))
         near = search.polished_near(found, min(e.bic for e in found))

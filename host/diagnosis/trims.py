@@ -11,6 +11,7 @@ from host.diagnosis.explanation import Explanation, Names
 from host.equations import NAMES
 from host.gauss_newton import Point
 from host.maximum_likelihood import fit_maximum_likelihood
+from host.recording import Array
 from host.valleys import plausibility
 
 if TYPE_CHECKING:
@@ -44,10 +45,7 @@ def retrimmed(fitter: "Fitter", explanation: Explanation, offsets: Names) -> Exp
     """
     names = (explanation.names - {FREE_TRIM.name, *OFFSETS}) | offsets
     fit = explanation.fit
-    known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
-    shift = np.zeros(2)
-    for name in explanation.names & {FREE_TRIM.name, *OFFSETS}:
-        shift += as_trim(known, name) @ [known[p.name] for p in named(name).parameters]
+    known, shift = _offset(explanation)
     chosen = sorted(offsets)
     if not chosen and COMPRESSED in names:  # its neutral depth takes over
         known["neutral_depth"] -= shift[0] / (known["c_wz"] or np.inf)
@@ -58,3 +56,22 @@ def retrimmed(fitter: "Fitter", explanation: Explanation, offsets: Names) -> Exp
     parameters = np.array([known[name] for name in structure.names])
     start = Point(structure, parameters, fit.initial, fit.levels)
     return fitter.explained(names, fitter.fitted([start], explanation.fit))
+
+
+def untrimmed(fitter: "Fitter", explanation: Explanation) -> Explanation:
+    """The same set with a free trim in the place of its offsets."""
+    if FREE_TRIM.name in explanation.names:
+        return explanation
+    names = explanation.names - {*OFFSETS} | {FREE_TRIM.name}
+    _, shift = _offset(explanation)
+    return fitter.explained(names, fitter.carried_on(fitter.point(names, explanation, FREE_TRIM.name, shift)))
+
+
+def _offset(explanation: Explanation) -> tuple[dict[str, float], Array]:
+    """The parameters of a set, and the constant force and moment (2,) of its offsets, or its free trim."""
+    fit = explanation.fit
+    known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
+    shift = np.zeros(2)
+    for name in explanation.names & {FREE_TRIM.name, *OFFSETS}:
+        shift += as_trim(known, name) @ [known[p.name] for p in named(name).parameters]
+    return known, shift

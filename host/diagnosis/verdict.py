@@ -6,7 +6,7 @@ that cancel, of which only the curve of one (a weight along a pitched hull, c_w0
 What the hull does late or twice passes for a short sea, too, if for one that is hardly likelier than others.
 """
 
-from math import inf
+from math import inf, pi, sqrt
 from typing import Literal
 
 from host.catalogue import BY_NAME, FAINT, ORDINARY
@@ -17,6 +17,7 @@ from host.diagnosis.leftover import SEA_DOUBT, Leftover
 from host.diagnosis.minute import minute_in
 from host.diagnosis.scoring import Misfit
 from host.diagnosis.unknown_physics import known_in, unknown_in
+from host.recording import Array
 
 Verdict = Literal["no_mismatch", "explained", "partly_explained", "unexplained"]
 WORSE = 2.0  # chi2 of held-out spans from which on an explanation must at least better the base there
@@ -26,6 +27,11 @@ BY_SEA = " Random forces act as well (waves, current, turbulence); they are part
 BY_SPEED = (
     " The errors of the measured speed lead a free run away from the recording, as small random forces "
     "would, most of all that of a hull which is unstable by itself; as such they are part of the noise model."
+)
+DRIFT = (
+    ("pitch is off by {:.2g} deg", 180.0 / pi),
+    ("depth is off by {:.2g} cm", 100.0),
+    ("the water rises and sinks by {:.2g} cm/s", 100.0),
 )
 CORRECTED = " The model corrects the measured speed, which errs, by the surge equation (speed_correction)."
 CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
@@ -94,7 +100,7 @@ def remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit
 
 
 def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit, waves: float) -> str:
-    sea = (BY_SPEED if left.is_by_speed else BY_SEA) * best.fit.has_process_noise
+    sea = (BY_SPEED if left.is_by_speed else BY_SEA) * best.fit.has_process_noise + _drift(best.fit.wander)
     if verdict == "no_mismatch":
         return "Nothing is missing from the base model on this recording." + sea
     forms = "".join(f" {sentence}" for sentence in unknown_in(best))
@@ -127,3 +133,15 @@ def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfi
     begin = "Most is explained, but" if is_part else "None of the physics in the catalogue explains this:"
     run = "a few seconds ahead" if left.is_by_speed or left.is_no_sea else "in a free run"
     return f"{begin} {worst} is still off by {size:.1f} times its sensor noise {run}; {kind}.{forms}" + sea
+
+
+def _drift(wander: Array) -> str:
+    """What drifts, in words."""
+    told = [
+        words.format(sqrt(variance) * scale) + f" for {time:.2g} s"
+        for (words, scale), (variance, time) in zip(DRIFT, wander.tolist(), strict=True)
+        if variance > 0.0
+    ]
+    if not told:
+        return ""
+    return f" Beside the sensors' white noise {' and '.join(told)} or so at a time: part of the noise model."

@@ -5,6 +5,7 @@ import os
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
+from copy import copy
 from multiprocessing.connection import wait
 from types import TracebackType
 from typing import Any
@@ -16,6 +17,7 @@ Task = tuple[Callable[..., Any], tuple[Any, ...]]
 """A function of a fitter and more, and what more it is given."""
 
 _fitter: Fitter
+_beside: dict[bytes, Fitter] = {}
 
 
 class Workers:
@@ -28,6 +30,12 @@ class Workers:
             # Spawned, not forked: the progress display runs a thread, and forks do not survive threads.
             context = multiprocessing.get_context("spawn")
             self._pool = ProcessPoolExecutor(jobs, context, _open, (fitter.recordings, fitter.base))
+
+    def beside(self, fitter: Fitter) -> "Workers":
+        """The same workers for another fitter of the same recordings, beside whose sets something drifts."""
+        other = copy(self)
+        other._fitter = fitter
+        return other
 
     def __enter__(self) -> "Workers":
         return self
@@ -46,7 +54,8 @@ class Workers:
                 found.append(function(self._fitter, *arguments))
                 on_done(number)
             return found
-        waiting = [self._pool.submit(_call, *task) for task in tasks]
+        base = self._fitter.base.lean() if self._fitter.wander.any() else None
+        waiting = [self._pool.submit(_call, *task, base) for task in tasks]
         for number, future in enumerate(waiting):
             found.append(future.result())
             on_done(number)
@@ -71,6 +80,14 @@ def leave_with_parent() -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def _call(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-    result = function(_fitter, *arguments)
+def _call(function: Callable[..., Any], arguments: tuple[Any, ...], base: Explanation | None) -> Any:
+    result = function(_fitter if base is None else _fitter_beside(base), *arguments)
     return result.lean() if isinstance(result, Explanation) else result
+
+
+def _fitter_beside(base: Explanation) -> Fitter:
+    """A fitter is kept for all that drifts beside it: what drifts tells it apart."""
+    key = base.fit.relative_wander.tobytes()
+    if key not in _beside:
+        _beside[key] = Fitter(_fitter.recordings, base)
+    return _beside[key]

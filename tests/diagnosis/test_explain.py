@@ -74,6 +74,7 @@ def test_a_rare_effect_that_joins_late_is_asked_unless_a_form_competes(
     monkeypatch.setattr(module, "told_by_the_usual", lambda *_: ORDINARY_SET)
     monkeypatch.setattr(module, "in_a_sea", lambda search, best: (search, best))
     monkeypatch.setattr(module, "among_waves", lambda search, best, _: (search, best, None))
+    monkeypatch.setattr(module, "among_drift", lambda *_: None)
     answer, _ = explained(monkeypatch, explanation(frozenset({"munk_moment"})))
     assert answer.best is (ORDINARY_SET if asked else late)
 

@@ -25,6 +25,7 @@ class Rounds:
         self.workers = SimpleNamespace(results=self._next)
         self.leading = SimpleNamespace(names=frozenset({0}), fit=20.0, bic=0.0)
         self.continued = 0
+        self.asks_drift, self.adrift = False, None
         patch.setattr(module, "with_ordinary", lambda search, _: search.sets[0])
         patch.setattr(module, "_by_continuation", Rounds._continued)
         patch.setattr(module, "_more", lambda *_: [])
@@ -85,6 +86,21 @@ def test_what_is_left_within_the_doubt_about_the_sensors_is_enough(monkeypatch: 
     search = Rounds([1.26], False, monkeypatch)
     assert found(search) is search.sets[0]
     assert found(Rounds([1.26], True, monkeypatch)) is None
+
+
+@pytest.mark.parametrize(("left", "is_asked"), [(1.05, False), (1.6, True)])
+def test_what_drifts_is_asked_before_a_continuation(
+    left: float, is_asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search, beside = Rounds([left], True, monkeypatch), SimpleNamespace()
+    search.asks_drift = True
+    monkeypatch.setattr(module, "plain_drift", lambda *_: beside)
+    assert (found(search) is None) is is_asked
+    assert (search.adrift is beside) is is_asked
+    assert search.continued == 0
+    monkeypatch.setattr(module, "plain_drift", lambda *_: None)
+    found(search)
+    assert search.continued == is_asked
 
 
 def test_what_led_nowhere_beside_less_is_not_tried_beside_more(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -94,7 +94,7 @@ def test_no_noise_level_can_be_moved_uphill(which: str) -> None:
         noise = fit.noise
     else:
         fit, model = coloured_noise(start, inputs), WanderingSensors(inputs)
-        noise = np.concatenate([fit.noise[:2], fit.wander[:, 0], fit.wander[:, 1]])
+        noise = np.concatenate([fit.noise[:2], fit.wander[:2, 0], fit.wander[:2, 1]])
     point = Point(fit.structure, fit.parameters, fit.initial, noise)
     top = place(point, model).likelihood
     assert top == pytest.approx(fit.log_likelihood, abs=1e-6)

@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from host.drift import Whitening
 from host.equations import NAMES
 from host.maximum_likelihood import fit_maximum_likelihood
 from host.propagate import free_run, inputs_of
 from host.recording import Array, Recording
 from host.speed import smoothed_speed
-from host.speed_error import SpeedError, speed_error, speed_errors
+from host.speed_error import speed_error, speed_errors
 
 BASE = np.array([-0.63084, -3.38699, -8.19858, 0.41385, -3.94120, 1.5, 0.0, 0.0])
 DEPTH_NOISE, PITCH_NOISE, SPEED_NOISE = 0.005, 0.001, 0.05
@@ -42,10 +43,10 @@ def dive(rng: np.random.Generator, rows: int = 1500) -> Recording:
     )
 
 
-def filter_of(recording: Recording) -> SpeedError:
+def filter_of(recording: Recording) -> Whitening:
     found = speed_error(recording, DEPTH_NOISE**2)
     assert found is not None
-    return found
+    return Whitening(found)
 
 
 def covariance_of(recording: Recording) -> Array:

@@ -1,0 +1,149 @@
+"""Sensors whose errors wander and water that rises and sinks are part of the noise, and hide no physics."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hidden_dive import Extra, hidden_dive, nothing
+
+from host.diagnosis.diagnose import diagnose
+from host.diagnosis.drift_fits import beside, drifting, plain_drift
+from host.diagnosis.drifts import again_in_drift
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.files import write_extended_model
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.leftover import leftover
+from host.diagnosis.scoring import misfit
+from host.diagnosis.search import Search
+from host.diagnosis.seas import Explained
+from host.diagnosis.spans import divide
+from host.diagnosis.workers import Workers
+from host.recording import Array, Recording
+from host.vehicle import default_vehicle
+
+
+def walk(deviation: float, time: float, rows: int, seed: int) -> Array:
+    """What wanders so at 10 Hz (first order)."""
+    a, values = np.exp(-0.1 / time), deviation * np.random.default_rng(seed).standard_normal(rows)
+    for k in range(1, rows):
+        values[k] = a * values[k - 1] + np.sqrt(1.0 - a**2) * values[k]
+    return values
+
+
+def with_wandering_sensors(extra: Extra = nothing, duration: float = 120.0) -> Recording:
+    """Pitch is off by 0.25 deg for a second or so, depth by 4 cm for three."""
+    plain = hidden_dive(extra, duration=duration, seed=4)
+    rows = plain.time.size
+    pitch = plain.pitch + walk(np.deg2rad(0.25), 1.0, rows, 5)
+    return replace(plain, pitch=pitch, depth=plain.depth + walk(0.04, 3.0, rows, 6))
+
+
+def in_gusts(extra: Extra, duration: float = 150.0) -> Recording:
+    """Water that rises and sinks by 5 cm/s for 6 s or so."""
+    water = walk(0.05, 6.0, int(10 * duration) + 1, 7)
+
+    def carried(time: float, x: Array, plane: float) -> tuple[float, float, float]:
+        force, moment, climb = extra(time, x, plane)
+        return force, moment, climb + float(water[int(10.0 * time)])
+
+    return hidden_dive(carried, duration=duration, seed=8)
+
+
+def damping(_: float, x: Array, __: float) -> tuple[float, float, float]:
+    return 0.0, -8.0 * float(x[1] * abs(x[1])), 0.0
+
+
+def fin_lost(time: float, _: Array, plane: float) -> tuple[float, float, float]:
+    lost = -0.3 * (time > 70.0) * plane
+    return 0.41385 * lost, -3.94120 * lost, 0.0
+
+
+def test_physics_is_named_beside_sensors_that_wander(tmp_path: Path) -> None:
+    found = diagnose([with_wandering_sensors(damping)])
+    assert [effect.name for effect in found.effects] == ["pitch_quadratic_damping"]
+    assert found.verdict == "explained"
+    value, std, _ = found.effects[0].coefficients["c_qq"]
+    assert abs(value + 8.0) < 3.0 * std
+    assert "pitch is off by" in found.remaining
+    assert "depth is off by" in found.remaining
+    write_extended_model(found, default_vehicle(), tmp_path / "extended_model.json")
+    noise = json.loads((tmp_path / "extended_model.json").read_text())["noise"]
+    assert noise["depth_wander_m"] == pytest.approx(0.04, rel=0.4)
+    assert noise["pitch_wander_s"] == pytest.approx(1.0, rel=0.6)
+
+
+def test_a_fin_that_was_lost_is_named_and_timed_among_gusts() -> None:
+    found = diagnose([in_gusts(fin_lost)])
+    assert [effect.name for effect in found.effects] == ["rudder_effectiveness_change"]
+    assert found.verdict == "explained"
+    assert found.effects[0].coefficients["effectiveness_step"][0] == pytest.approx(-0.3, abs=0.03)
+    assert found.effects[0].coefficients["effectiveness_time"][0] == pytest.approx(70.0, abs=1.0)
+    assert "the water rises and sinks by" in found.remaining
+
+
+def test_sensors_that_wander_are_no_mismatch() -> None:
+    found = diagnose([with_wandering_sensors()])
+    assert found.verdict == "no_mismatch"
+    assert not found.effects
+    assert "depth is off by" in found.remaining
+
+
+def test_physics_that_was_left_out_does_not_pass_for_drift() -> None:
+    def strong(_: float, x: Array, plane: float) -> tuple[float, float, float]:
+        return 2.0 * float(x[1]), -8.0 * float(x[1] * abs(x[1])) + 3.0 * plane**2, 0.0
+
+    fitter = Fitter([hidden_dive(strong, seed=9)])
+    assert fitter.excess(fitter.base.fit) > 2.0
+    assert plain_drift(fitter, fitter.base) is None
+    wandering = Fitter([with_wandering_sensors()])
+    assert plain_drift(wandering, wandering.base) is not None
+
+
+def test_nothing_drifts_where_all_that_is_left_is_white() -> None:
+    fitter = Fitter([hidden_dive()])
+    assert drifting(fitter, fitter.base) is None
+
+
+@pytest.fixture(scope="module")
+def gusty() -> tuple[Fitter, Explanation]:
+    """The teaching stretches of a dive among gusts, and the base beside what drifts."""
+    fitter = Fitter(divide([in_gusts(nothing)]).teaching)
+    found = drifting(fitter, fitter.base)
+    assert found is not None
+    return fitter, found
+
+
+def test_held_out_errors_are_weighed_by_how_far_water_may_carry_a_vehicle(
+    gusty: tuple[Fitter, Explanation],
+) -> None:
+    fitter, found = gusty
+    spans = divide([in_gusts(nothing)])
+    plain, told = (misfit(one, spans, fitter.floor) for one in (fitter.base, found))
+    assert plain.chi2_depth > 20.0
+    assert told.chi2_depth < 3.0
+    assert told.depth_rmse_m < plain.depth_rmse_m  # the filter knows how far it was carried before
+
+
+def test_workers_keep_a_fitter_for_all_that_drifts(gusty: tuple[Fitter, Explanation]) -> None:
+    fitter, found = gusty
+    among = beside(fitter, found.fit.relative_wander)
+    task = (Fitter.grown, (found, "heave_pitch_rate_coupling", []))
+    with Workers(fitter, 2) as workers:
+        (plain,) = workers.results([(Fitter.grown, (fitter.base, "heave_pitch_rate_coupling", []))])
+        (here,) = workers.beside(among).results([task])
+    assert not plain.fit.has_coloured_noise
+    np.testing.assert_allclose(here.fit.wander[2], found.fit.wander[2], rtol=0.1)
+    assert here.bic == pytest.approx(among.grown(found, "heave_pitch_rate_coupling", []).bic, abs=1e-6)
+
+
+def test_what_drifts_on_a_part_is_looked_for_on_the_whole(gusty: tuple[Fitter, Explanation]) -> None:
+    fitter, found = gusty
+    search = Search(fitter, Workers(fitter, 1), lambda _: None, found, found)
+    part = Explained(found, search, leftover(beside(fitter, found.fit.relative_wander), found), None)
+    whole = Fitter([in_gusts(nothing)])
+    told = again_in_drift(whole, Workers(whole, 1), lambda _: None, part)
+    assert told.left.is_nothing
+    assert not told.best.names
+    assert np.sqrt(told.best.fit.wander[2, 0]) == pytest.approx(0.05, rel=0.4)
