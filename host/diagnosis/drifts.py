@@ -9,20 +9,21 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
 from host.diagnosis.margins import NAMING_MARGIN, TWIN_MARGIN
-from host.diagnosis.sea_fits import as_filtered
+from host.diagnosis.sea_fits import as_filtered, with_sea
 from host.diagnosis.search import Search
 from host.diagnosis.seas import Explained
 from host.diagnosis.together import with_more
 from host.diagnosis.trims import untrimmed
 from host.diagnosis.workers import Workers
 
+CLEARLY = 2.0 * TWIN_MARGIN  # likelier: gusts and white forces may be all but the same
 ROUNDS = 3  # of a search and of the levels beside what it found
 
 
 def in_drift(calm: Search, first: Explanation) -> Explained | None:
     """The search from a set of many beside what drifts with it.
 
-    None where in the end nothing does, or effects in the place of what drifts are likelier.
+    None where in the end nothing does, or effects or random forces in the place of what drifts are likelier.
 
     While sets are compared what drifts stays as it was first found; it is estimated again beside the best.
     """
@@ -36,6 +37,8 @@ def in_drift(calm: Search, first: Explanation) -> Explained | None:
         if again.bic > found.bic - TWIN_MARGIN:
             break
         found = again
+    if with_sea(fitter, found).bic < found.bic - CLEARLY:
+        return None
     if _with_effects_instead(calm, found).bic < found.bic - NAMING_MARGIN:
         return None
     return Explained(found, search, leftover(search.fitter, found), None)
