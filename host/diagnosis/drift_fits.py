@@ -52,7 +52,7 @@ def plain_drift(fitter: Fitter, explanation: Explanation) -> Explanation | None:
     if found is None or found.bic > min(sea.bic, as_filtered(fitter, explanation).bic) - NAMING_MARGIN:
         return None
     left = leftover(beside(fitter, found.fit.relative_wander), found)
-    return None if left.is_coloured or left.is_local or left.is_above_floor else found
+    return None if left.is_coloured or left.is_above_floor else found
 
 
 def levels_beside(fitter: Fitter, explanation: Explanation) -> Array:
