@@ -41,9 +41,9 @@ def likeliest_drift(
     for kinds in (kinds for size in range(len(told) + 1) for kinds in combinations(told, size)):
         levels, likelihood = _fitted(drifts, residuals, {kind: longest[kind] for kind in kinds}, step)
         bic = 2.0 * len(kinds) * np.log(count) - 2.0 * likelihood
-        if bic < least:
+        if bic < least and all(time < NEARLY * longest[kind] for kind, (_, time) in levels.items()):
             best, least = levels, bic
-    return {kind: told for kind, told in best.items() if told[1] < NEARLY * longest[kind]}
+    return best
 
 
 def _fitted(

@@ -72,4 +72,4 @@ def levels_beside(fitter: Fitter, explanation: Explanation) -> Array:
 
 
 def _without_forces(fit: Fit) -> Fit:
-    return replace(fit, noise=np.array([*fit.noise[:2], 0.0, 0.0]))
+    return replace(fit, noise=np.array([*fit.noise[:2], 0.0, 0.0]), waves=np.zeros_like(fit.waves))

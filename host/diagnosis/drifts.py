@@ -24,7 +24,6 @@ def in_drift(calm: Search, first: Explanation) -> Explained | None:
     """The search from a set of many beside what drifts with it.
 
     None where in the end nothing does, or effects or random forces in the place of what drifts are likelier.
-
     While sets are compared what drifts stays as it was first found; it is estimated again beside the best.
     """
     fitter, found = calm.fitter, first
@@ -34,7 +33,7 @@ def in_drift(calm: Search, first: Explanation) -> Explained | None:
         again = drifting(fitter, found)
         if again is None:
             return None
-        if again.bic > found.bic - TWIN_MARGIN:
+        if again.bic > found.bic - TWIN_MARGIN or number == ROUNDS - 1:
             break
         found = again
     if with_sea(fitter, found).bic < found.bic - CLEARLY:
