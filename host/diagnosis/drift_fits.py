@@ -48,7 +48,9 @@ def plain_drift(fitter: Fitter, explanation: Explanation) -> Explanation | None:
     was left out does, do not explain as much.
     """
     sea = with_sea(fitter, explanation)
-    found = drifting(fitter, sea)
+    # The free run of either may be far from the recording, and what drifts beside it then makes up for that.
+    both = [drifting(fitter, one) for one in (explanation, sea)]
+    found = min((one for one in both if one is not None), key=lambda e: e.bic, default=None)
     if found is None or found.bic > min(sea.bic, as_filtered(fitter, explanation).bic) - NAMING_MARGIN:
         return None
     left = leftover(beside(fitter, found.fit.relative_wander), found)

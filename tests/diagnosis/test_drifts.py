@@ -1,25 +1,27 @@
 """Sensors whose errors wander and water that rises and sinks are part of the noise, and hide no physics."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hidden_dive import Extra, hidden_dive, nothing
 
+from host.diagnosis.diagnose import diagnose
 from host.diagnosis.drift_fits import beside, drifting
-from host.diagnosis.drifts import again_in_drift, in_drift
+from host.diagnosis.drifts import again_in_drift
 from host.diagnosis.explanation import Explanation
+from host.diagnosis.files import write_extended_model
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
-from host.diagnosis.scoring import Misfit, misfit
+from host.diagnosis.scoring import misfit
 from host.diagnosis.search import Search
 from host.diagnosis.seas import Explained
 from host.diagnosis.spans import divide
-from host.diagnosis.verdict import remaining
 from host.diagnosis.workers import Workers
 from host.recording import Array, Recording
-
-NO_MISFIT = Misfit(depth_rmse_m=0.0, pitch_rmse_rad=0.0, chi2_depth=1.0, chi2_pitch=1.0)
+from host.vehicle import default_vehicle
 
 
 def walk(deviation: float, time: float, rows: int, seed: int) -> Array:
@@ -53,27 +55,19 @@ def damping(_: float, x: Array, __: float) -> tuple[float, float, float]:
     return 0.0, -8.0 * float(x[1] * abs(x[1])), 0.0
 
 
-def searched(recording: Recording) -> Explained:
-    """The search beside what drifts with the base."""
-    fitter = Fitter([recording])
-    first = drifting(fitter, fitter.base)
-    assert first is not None
-    found = in_drift(Search(fitter, Workers(fitter, 1), lambda _: None, fitter.base, fitter.root), first)
-    assert found is not None
-    return found
-
-
-def test_physics_is_named_beside_sensors_that_wander() -> None:
-    found = searched(with_wandering_sensors(damping))
-    assert found.best.names == {"pitch_quadratic_damping"}
-    assert found.left.is_nothing
-    pitch, depth, current = np.sqrt(found.best.fit.wander[:, 0])
-    assert np.rad2deg(pitch) == pytest.approx(0.25, rel=0.4)
-    assert depth == pytest.approx(0.04, rel=0.4)
-    assert current == 0.0
-    told = remaining("explained", found.best, found.left, NO_MISFIT)
-    assert "pitch is off by" in told
-    assert "depth is off by" in told
+def test_physics_is_named_beside_sensors_that_wander(tmp_path: Path) -> None:
+    found = diagnose([with_wandering_sensors(damping)])
+    assert [effect.name for effect in found.effects] == ["pitch_quadratic_damping"]
+    assert found.verdict == "explained"
+    value, std, _ = found.effects[0].coefficients["c_qq"]
+    assert abs(value + 8.0) < 3.0 * std
+    assert "pitch is off by" in found.remaining
+    assert "depth is off by" in found.remaining
+    write_extended_model(found, default_vehicle(), tmp_path / "extended_model.json")
+    noise = json.loads((tmp_path / "extended_model.json").read_text())["noise"]
+    assert noise["depth_wander_m"] == pytest.approx(0.04, rel=0.4)
+    assert noise["pitch_wander_rad"] == pytest.approx(np.deg2rad(0.25), rel=0.4)
+    assert "current_wander_mps" not in noise
 
 
 def test_nothing_drifts_where_all_that_is_left_is_white() -> None:
