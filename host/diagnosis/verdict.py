@@ -9,6 +9,8 @@ What the hull does late or twice passes for a short sea, too, if for one that is
 from math import inf, pi, sqrt
 from typing import Literal
 
+import numpy as np
+
 from host.catalogue import BY_NAME, FAINT, ORDINARY
 from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import SPEED_CORRECTION
@@ -18,6 +20,7 @@ from host.diagnosis.minute import minute_in
 from host.diagnosis.scoring import Misfit
 from host.diagnosis.unknown_physics import known_in, unknown_in
 from host.recording import Array
+from host.uncertainty import covariance
 
 Verdict = Literal["no_mismatch", "explained", "partly_explained", "unexplained"]
 WORSE = 2.0  # chi2 of held-out spans from which on an explanation must at least better the base there
@@ -35,6 +38,9 @@ DRIFT = (
 )
 CORRECTED = " The model corrects the measured speed, which errs, by the surge equation (speed_correction)."
 CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
+KNOWN = (
+    1.0 / 3.0
+)  # of a coefficient, is what its deviation may be if a bound that it ends at is to tell anything
 
 
 def verdict_on(
@@ -80,17 +86,38 @@ def cancelling_in(explanation: Explanation) -> list[str]:
     return offsets if is_cancelled else []
 
 
+def beyond_bounds_in(explanation: Explanation) -> list[str]:
+    """The effects with a coefficient that ends at the largest value its bounds allow, and is known there.
+
+    It would be larger still if it could: what no vehicle has does the work of something else.
+    """
+    fit = explanation.fit
+    std = np.sqrt(np.diag(covariance(fit)))
+    found: list[str] = []
+    for effect in fit.structure.effects:
+        for parameter in effect.parameters:
+            k = fit.structure.names.index(parameter.name)
+            largest = max(abs(parameter.lower), abs(parameter.upper))
+            if abs(fit.parameters[k]) > (1.0 - 1e-6) * largest and 0.0 < std[k] < KNOWN * largest:
+                found.append(effect.name)
+    return sorted({*found} & {*known_in(explanation)})
+
+
 def _doubt(explanation: Explanation, waves: float) -> str:
     """Why a set that leaves nothing may yet be none that acts; empty where nothing speaks against it."""
     if waves < FAINT_WAVES:
         return "waves are hardly likelier than physics that the catalogue does not hold."
-    names, are = rare_in(explanation), "seldom act at once"
-    if len(names) <= MOST_RARE:
-        names, are = cancelling_in(explanation), "cancel"
-    if not names:
-        return ""
-    listed = ", ".join(name.replace("_", " ") for name in names)
-    return f"{listed} {are}: together they may imitate physics that the catalogue does not hold."
+    rare = rare_in(explanation)
+    reasons = (
+        (rare if len(rare) > MOST_RARE else [], "seldom act at once: together"),
+        (cancelling_in(explanation), "cancel: together"),
+        (beyond_bounds_in(explanation), "would have to be larger than on any vehicle:"),
+    )
+    for names, why in reasons:
+        if names:
+            listed = ", ".join(name.replace("_", " ") for name in names)
+            return f"{listed} {why} they may imitate physics that the catalogue does not hold."
+    return ""
 
 
 def remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit, waves: float = inf) -> str:

@@ -11,7 +11,14 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import Leftover
 from host.diagnosis.scoring import Misfit
-from host.diagnosis.verdict import Verdict, cancelling_in, rare_in, remaining, verdict_on
+from host.diagnosis.verdict import (
+    Verdict,
+    beyond_bounds_in,
+    cancelling_in,
+    rare_in,
+    remaining,
+    verdict_on,
+)
 
 COMMON = {"heave_pitch_rate_coupling", "munk_moment", "speed_loss", "actuator_lag", "net_buoyancy"}
 RARE = ("ballast_change", "depth_sensor_lever_arm", "internal_wave")
@@ -96,6 +103,31 @@ def test_offsets_that_cancel_are_doubted_by_name(
     said = remaining(verdict, best, leftover(), misfit(1.0))
     assert ("net buoyancy, rudder offset, trim moment cancel:" in said) == (verdict == "partly_explained")
     assert not cancelling_in(replace(best, names=offsets - {"trim_moment"}))
+
+
+@pytest.mark.parametrize(
+    ("c_ud", "std", "is_doubted"), [(500.0, 100.0, True), (500.0, 400.0, False), (400.0, 100.0, False)]
+)
+def test_a_coefficient_that_would_be_larger_than_on_any_vehicle_is_doubted(
+    base: Explanation, c_ud: float, std: float, is_doubted: bool
+) -> None:
+    structure = structure_of(frozenset({"speed_loss"}))
+    fit, count = base.fit, len(structure.names)
+    known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True)) | {"c_ud": c_ud}
+    values = np.array([known.get(name, 1.0) for name in structure.names])
+    free = np.ones(count, dtype=bool)
+    information = np.eye(count)
+    information[structure.names.index("c_ud"), structure.names.index("c_ud")] = std**-2
+    white = [np.random.default_rng(0).normal(size=row.shape) for row in fit.whitened]
+    found = replace(
+        fit, structure=structure, parameters=values, free=free, information=information, whitened=white
+    )
+    best = Explanation(frozenset({"speed_loss"}), found, base.bic)
+    assert beyond_bounds_in(best) == ["speed_loss"] * is_doubted
+    verdict: Verdict = "partly_explained" if is_doubted else "explained"
+    assert verdict_on(best, leftover(), misfit(5.0), misfit(1.0)) == verdict
+    said = remaining(verdict, best, leftover(), misfit(1.0))
+    assert ("speed loss would have to be larger than on any vehicle" in said) == is_doubted
 
 
 @pytest.mark.parametrize(("evidence", "verdict"), [(16.0, "partly_explained"), (200.0, "explained")])
