@@ -47,7 +47,8 @@ def _normal(error: Array, scores: Array, free: Mask) -> tuple[Array, Array]:
     """Normal matrix and right-hand side of the free parameters and the initial state."""
     J = np.concatenate([scores[:, : free.size][:, free], scores[:, free.size :]], axis=1)
     flat = J.transpose(1, 0, 2).reshape(int(free.sum()) + NX0, -1)
-    return flat @ flat.T, flat @ error.ravel()
+    with np.errstate(all="ignore"):  # a model that has run away is seen by its numbers
+        return flat @ flat.T, flat @ error.ravel()
 
 
 class GaussNewton:
@@ -93,6 +94,8 @@ class GaussNewton:
     def predicted_cost(self, cost: float) -> float:
         """Deviance, of `cost` here, after the full step if the equations were linear."""
         reduced, rhs = self._reduced()
+        if not np.isfinite(reduced).all():
+            return cost  # as no step is taken there
         left = cost - sum(float(gx @ np.linalg.solve(Hxx, gx)) for _, Hxx, gx in self.own)
         scale = np.sqrt(np.maximum(np.diag(self.H), 1e-300))
         step = self._reached(reduced, rhs, 1e-9, scale) - self.point.parameters[self.free]
@@ -105,8 +108,9 @@ class GaussNewton:
     def information(self) -> Array:
         """Fisher information of the free parameters alone."""
         reduced = self.H.copy()
-        for Hpx, Hxx, _ in self.own:
-            reduced -= Hpx @ np.linalg.solve(Hxx, Hpx.T)
+        with np.errstate(all="ignore"):
+            for Hpx, Hxx, _ in self.own:
+                reduced -= Hpx @ np.linalg.solve(Hxx, Hpx.T)
         return reduced
 
     def scores(self, white: list[tuple[Array, Array]]) -> list[Array]:
@@ -142,8 +146,9 @@ class GaussNewton:
     def _reduced(self) -> tuple[Array, Array]:
         """Normal matrix and right-hand side of the free parameters, the initial states eliminated."""
         rhs = self.g.copy()
-        for Hpx, Hxx, gx in self.own:
-            rhs -= Hpx @ np.linalg.solve(Hxx, gx)
+        with np.errstate(all="ignore"):
+            for Hpx, Hxx, gx in self.own:
+                rhs -= Hpx @ np.linalg.solve(Hxx, gx)
         return self.information(), rhs
 
     def _reached(self, reduced: Array, rhs: Array, damping: float, scale: Array) -> Array:

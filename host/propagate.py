@@ -21,6 +21,7 @@ from host.speed import smoothed_speed
 NX0 = len(STATES)
 MOST_SUBSTEPS = 8  # slow records show no modes faster than their sampling: finer steps would resolve nothing
 LONGEST_SUBSTEP = 0.05  # s; for a 10 rad/s mode the error of one sub-step is below 3e-4 of its change
+LONGEST_OF_ALL = 0.5  # s; a quarter of the shortest period of a wave
 LONGEST_DELAY = 1.0  # s; how far back commands are looked up
 
 
@@ -80,14 +81,17 @@ def inputs_of(
     )
 
 
-def longest_substep(parameters: Array) -> float:
+def longest_substep(parameters: Array, step: float) -> float:
     """Sub-step, s, that resolves the modes of a vehicle with these base parameters: a fifth of 1 / rate.
 
-    Twice the rate is allowed for, as effects to come may quicken it.
+    Twice the rate is allowed for, as effects to come may quicken it. What the plane does within a sub-step
+    counts by its mean and its moment, however quick; waves are the quickest that acts, and half of a row
+    between samples `step` s apart, or LONGEST_OF_ALL, is enough for those that can be seen.
     """
     a1, a2, a3 = parameters[:3]
     fastest = max(abs(a1), abs(a2), abs(a3) ** 0.5)
-    return float(np.clip(0.4 / fastest, LONGEST_SUBSTEP, 2.0 * LONGEST_SUBSTEP))
+    longest = max(LONGEST_OF_ALL, step / 2.0)
+    return float(np.clip(0.4 / fastest, LONGEST_SUBSTEP, longest))
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,7 @@ class Fitter:
         self._inputs: dict[tuple[bool, bool], list[Inputs]] = {}  # by whether they hold earlier commands
         self.base = self._base() if known is None else known
         parameters = self.base.fit.parameters
-        self._longest_substep = longest_substep(parameters)
+        self._longest_substep = longest_substep(parameters, min(r.step for r in recordings))
         self.speed = float(parameters[NAMES.index("u0")])
         self.scales = {
             "": 1.0,

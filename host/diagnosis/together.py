@@ -106,6 +106,7 @@ def with_ordinary(search: "Search", explanation: Explanation) -> Explanation:
 
 def _by_continuation(search: "Search") -> Explanation | None:
     """All that every vehicle has, with little beside it; None where the filter loses the recording."""
+    search.on_progress("what every vehicle has, led by the measurements")
     names = frozenset({*ORDINARY, FREE_TRIM.name, *search.fitter.tools_beside(frozenset(ORDINARY))})
     found = continued(search, names, MOST_BESIDE)
     if found is None:

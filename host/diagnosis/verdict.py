@@ -89,13 +89,16 @@ def cancelling_in(explanation: Explanation) -> list[str]:
 def beyond_bounds_in(explanation: Explanation) -> list[str]:
     """The effects with a coefficient that ends at the largest value its bounds allow, and is known there.
 
-    It would be larger still if it could: what no vehicle has does the work of something else.
+    It would be larger still if it could: what no vehicle has does the work of something else. Not asked of
+    a share of what geometry gives, in which another detail of that geometry shows.
     """
     fit = explanation.fit
     std = np.sqrt(np.diag(covariance(fit)))
     found: list[str] = []
     for effect in fit.structure.effects:
         for parameter in effect.parameters:
+            if parameter.name.endswith("_share"):
+                continue
             k = fit.structure.names.index(parameter.name)
             largest = max(abs(parameter.lower), abs(parameter.upper))
             if abs(fit.parameters[k]) > (1.0 - 1e-6) * largest and 0.0 < std[k] < KNOWN * largest:

@@ -60,3 +60,10 @@ def test_the_others_make_up_for_what_stops_at_its_bound() -> None:
     clipped = np.array([whole[0], 0.0, np.clip(whole[2], -1.0, 1.0)])
     assert moved[1] == 0.0
     assert np.sum((error - S @ moved) ** 2) < np.sum((error - S @ clipped) ** 2)
+
+
+def test_where_the_slopes_leave_the_numbers_nothing_is_promised_and_no_step_taken() -> None:
+    step, S, _ = linear_problem(3, drag=-1.0, share=1.0)
+    lost = step.with_normal([(np.full((S.shape[1] + 4,) * 2, np.inf), np.zeros(S.shape[1] + 4))])
+    assert lost.promise() == 0.0
+    assert lost.trial(1.0) is lost.point

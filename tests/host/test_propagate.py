@@ -1,9 +1,10 @@
 import numpy as np
+import pytest
 from exact_dive import TABLE_1, Dive, fly
 from scipy.stats import multivariate_normal
 
 from host.kalman import kalman_pass
-from host.propagate import free_run, inputs_of
+from host.propagate import free_run, inputs_of, longest_substep
 from host.sensitivities import innovations
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
@@ -13,6 +14,17 @@ def test_free_run_equals_the_matrix_exponential() -> None:
     recording, states = fly(Dive(duration=60.0))
     simulated = free_run(TRUTH, states[:, 0], inputs_of(recording)).states
     assert np.abs(simulated - states).max() < 2e-6
+
+
+@pytest.mark.parametrize(("step", "substeps"), [(0.1, 1), (0.5, 1), (1.0, 2), (4.0, 2)])
+def test_a_slow_vehicle_needs_few_sub_steps_however_seldom_it_is_recorded(step: float, substeps: int) -> None:
+    slow = (-0.1, -0.2, -0.02, 0.03, -0.02, 0.5)
+    recording, states = fly(Dive(vehicle=slow, step=step, duration=600.0))
+    truth = np.array([*slow, 0.0, 0.0])
+    inputs = inputs_of(recording, longest_substep=longest_substep(truth, step))
+    assert inputs.substeps == substeps
+    simulated = free_run(truth, states[:, 0], inputs).states
+    assert (np.abs(simulated - states).max(axis=1) < 1e-3 * np.ptp(states, axis=1)).all()
 
 
 def test_free_run_follows_a_speed_that_changes_from_row_to_row() -> None:
