@@ -20,7 +20,7 @@ from host.diagnosis.minute import minute_in
 from host.diagnosis.scoring import Misfit
 from host.diagnosis.unknown_physics import known_in, unknown_in
 from host.recording import Array
-from host.uncertainty import covariance
+from host.uncertainty import safe_inverse
 
 Verdict = Literal["no_mismatch", "explained", "partly_explained", "unexplained"]
 WORSE = 2.0  # chi2 of held-out spans from which on an explanation must at least better the base there
@@ -38,9 +38,8 @@ DRIFT = (
 )
 CORRECTED = " The model corrects the measured speed, which errs, by the surge equation (speed_correction)."
 CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
-KNOWN = (
-    1.0 / 3.0
-)  # of a coefficient, is what its deviation may be if a bound that it ends at is to tell anything
+NEARLY = 1.0 - 1e-6  # of a bound: at it
+KNOWN = 1.0 / 3.0  # of it, is what a deviation may be there, if to end at a bound is to tell anything
 
 
 def verdict_on(
@@ -93,17 +92,17 @@ def beyond_bounds_in(explanation: Explanation) -> list[str]:
     a share of what geometry gives, in which another detail of that geometry shows.
     """
     fit = explanation.fit
-    std = np.sqrt(np.diag(covariance(fit)))
+    names = fit.structure.names
+    std = np.sqrt(np.diag(safe_inverse(fit.information)))  # a lean fit does not know how coloured it is
     found: list[str] = []
-    for effect in fit.structure.effects:
+    for effect in map(BY_NAME.__getitem__, known_in(explanation)):
         for parameter in effect.parameters:
-            if parameter.name.endswith("_share"):
+            if parameter.name not in names or parameter.name.endswith("_share"):
                 continue
-            k = fit.structure.names.index(parameter.name)
-            largest = max(abs(parameter.lower), abs(parameter.upper))
-            if abs(fit.parameters[k]) > (1.0 - 1e-6) * largest and 0.0 < std[k] < KNOWN * largest:
+            k, largest = names.index(parameter.name), max(abs(parameter.lower), abs(parameter.upper))
+            if fit.free[k] and abs(fit.parameters[k]) > NEARLY * largest and std[k] < KNOWN * largest:
                 found.append(effect.name)
-    return sorted({*found} & {*known_in(explanation)})
+    return sorted({*found})
 
 
 def _doubt(explanation: Explanation, waves: float) -> str:

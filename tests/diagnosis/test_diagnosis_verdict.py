@@ -97,7 +97,9 @@ def test_offsets_that_cancel_are_doubted_by_name(
     known = dict(zip(base.fit.structure.names, base.fit.parameters.tolist(), strict=True))
     known |= {"rudder_zero": 0.2, "c_w0": -0.2 * known["b1"], "c_q0": -0.2 * known["b2"] * (1.0 + left_over)}
     values = np.array([known[name] for name in structure.names])
-    best = Explanation(offsets, replace(base.fit, structure=structure, parameters=values), base.bic)
+    free, information = np.ones(values.size, dtype=bool), np.eye(values.size)
+    fit = replace(base.fit, structure=structure, parameters=values, free=free, information=information)
+    best = Explanation(offsets, fit, base.bic)
     assert bool(cancelling_in(best)) == (verdict == "partly_explained")
     assert verdict_on(best, leftover(), misfit(5.0), misfit(1.0)) == verdict
     said = remaining(verdict, best, leftover(), misfit(1.0))
@@ -112,7 +114,7 @@ def test_a_coefficient_that_would_be_larger_than_on_any_vehicle_is_doubted(
     base: Explanation, c_ud: float, std: float, is_doubted: bool
 ) -> None:
     structure = structure_of(frozenset({"speed_loss"}))
-    fit, count = base.fit, len(structure.names)
+    fit, count = base.lean().fit, len(structure.names)
     known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True)) | {"c_ud": c_ud}
     values = np.array([known.get(name, 1.0) for name in structure.names])
     free = np.ones(count, dtype=bool)
