@@ -21,6 +21,7 @@ from host.diagnosis.scoring import Misfit, foretells, free_run_errors, misfit
 from host.diagnosis.sea_fits import WAVES, again_in_waves, again_under_forces, with_regular_waves
 from host.diagnosis.search import Search
 from host.diagnosis.seas import Explained, Waves, evidence
+from host.diagnosis.sensed import as_sensed
 from host.diagnosis.spans import Spans, divide, excerpt
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.unknown_physics import known_in
@@ -96,12 +97,13 @@ def diagnose(
 ) -> Diagnosis:
     """Finds what the paper's equations lack on these recordings of one vehicle, on `jobs` cores.
 
-    Spikes are left out first, and it is asked what the plane did between rows: that is no physics.
+    Spikes are left out first, what is smoother than sensors are gets their noise, and it is asked what the
+    plane did between rows: that is no physics.
 
     like  an explanation of a vehicle that this one should resemble: if of many effects, it is begun with
     """
     on_progress("base model")
-    first, *others = by_single_effects(ways(without_outliers(recordings)), on_progress, jobs)
+    first, *others = by_single_effects(ways(as_sensed(without_outliers(recordings))), on_progress, jobs)
     return _diagnosed(first, others, on_progress, jobs, like)
 
 

@@ -191,6 +191,10 @@ class Fitter:
         ends = other_valleys(fit, self.inputs(explanation.names))
         return self.explained(explanation.names, with_rivals(fit, ends))
 
+    def entered(self, start: Point, rival: Explanation) -> Explanation:
+        """The rival's set begun in another valley, given up where it would not get as far there."""
+        return self.explained(rival.names, self.fitted([start], rival.fit, PATIENT_ITERATIONS))
+
     def refitted(self, explanation: Explanation) -> Explanation:
         """A set fitted to other stretches, fitted to these."""
         start = self.begun(explanation)

@@ -14,11 +14,14 @@ from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.continuation import continued
 from host.diagnosis.drift_fits import plain_drift
 from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import is_above_floor
 from host.diagnosis.margins import FEW, LITTLE, MUCH, SMALL, margin
 from host.diagnosis.pruning import pruned
 from host.diagnosis.trims import retrimmed
 from host.diagnosis.workers import Task
+from host.gauss_newton import Point
+from host.valleys import look_alikes
 
 if TYPE_CHECKING:
     from host.diagnosis.search import Search
@@ -35,6 +38,8 @@ def together(search: "Search", leading: Explanation) -> Explanation | None:
     """
     search.on_progress("what every vehicle has")
     fitter, best = search.fitter, with_ordinary(search, leading)
+    if fitter.excess(best.fit) > LITTLE:
+        best = _among_look_alikes(search, best)
     if fitter.excess(best.fit) < MUCH:
         best = with_more(search, best)
     if search.asks_drift and fitter.excess(best.fit) > LITTLE:
@@ -102,6 +107,18 @@ def with_ordinary(search: "Search", explanation: Explanation) -> Explanation:
                 explanation = grown
     search.joint.add(explanation.names)
     return search.remember(search.fitter.polished(explanation))
+
+
+def _among_look_alikes(search: "Search", best: Explanation) -> Explanation:
+    """The set in the likeliest valley of the points that move much as it does (host.valleys).
+
+    A lag that joins a leading effect which had its work to do may leave the hull the lag's pole and take one
+    of the hull's, from where no fit comes back.
+    """
+    best = best.lean()
+    here = Point(best.fit.structure, best.fit.parameters, best.fit.initial, best.fit.noise)
+    tasks: list[Task] = [(Fitter.entered, (start, best)) for start in look_alikes(here)]
+    return search.remember(min([best, *search.workers.results(tasks)], key=lambda e: e.bic))
 
 
 def _by_continuation(search: "Search") -> Explanation | None:

@@ -38,6 +38,7 @@ DRIFT = (
 )
 CORRECTED = " The model corrects the measured speed, which errs, by the surge equation (speed_correction)."
 CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
+LARGEST_SHARE = 4.0  # of what geometry gives, that bounds allow
 NEARLY = 1.0 - 1e-6  # of a bound: at it
 KNOWN = 1.0 / 3.0  # of it, is what a deviation may be there, if to end at a bound is to tell anything
 
@@ -89,7 +90,7 @@ def beyond_bounds_in(explanation: Explanation) -> list[str]:
     """The effects with a coefficient that ends at the largest value its bounds allow, and is known there.
 
     It would be larger still if it could: what no vehicle has does the work of something else. Not asked of
-    a share of what geometry gives, in which another detail of that geometry shows.
+    a share: the whole is natural, and in more than that another detail of the same geometry shows.
     """
     fit = explanation.fit
     names = fit.structure.names
@@ -97,7 +98,8 @@ def beyond_bounds_in(explanation: Explanation) -> list[str]:
     found: list[str] = []
     for effect in map(BY_NAME.__getitem__, known_in(explanation)):
         for parameter in effect.parameters:
-            if parameter.name not in names or parameter.name.endswith("_share"):
+            is_share = parameter.unit == "1" and parameter.lower >= 0.0 and parameter.upper <= LARGEST_SHARE
+            if parameter.name not in names or is_share:
                 continue
             k, largest = names.index(parameter.name), max(abs(parameter.lower), abs(parameter.upper))
             if fit.free[k] and abs(fit.parameters[k]) > NEARLY * largest and std[k] < KNOWN * largest:

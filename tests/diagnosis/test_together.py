@@ -1,12 +1,25 @@
 """When to go on adding to what every vehicle has, and when to give up."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
+from hidden_dive import BASE, hidden_dive
 
+from host.catalogue import structure_of
 from host.diagnosis import together as module
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.search import Search
 from host.diagnosis.together import completed, together
+from host.diagnosis.workers import Workers
+from host.gauss_newton import Point
+from host.output_error import output_error
+from host.propagate import free_run, inputs_of
+from host.valleys import with_poles_swapped
+
+AT_REST = np.array([0.0, 0.0, 0.0, 20.0])
 
 
 class Rounds:
@@ -27,6 +40,7 @@ class Rounds:
         self.continued = 0
         self.asks_drift, self.adrift = False, None
         patch.setattr(module, "with_ordinary", lambda search, _: search.sets[0])
+        patch.setattr(module, "_among_look_alikes", lambda _, best: best)
         patch.setattr(module, "_by_continuation", Rounds._continued)
         patch.setattr(module, "_more", lambda *_: [])
         patch.setattr(module, "margin", lambda _: 6.0)
@@ -86,6 +100,40 @@ def test_what_is_left_within_the_doubt_about_the_sensors_is_enough(monkeypatch: 
     search = Rounds([1.26], False, monkeypatch)
     assert found(search) is search.sets[0]
     assert found(Rounds([1.26], True, monkeypatch)) is None
+
+
+@pytest.mark.parametrize("left", [1.05, 1.6])
+def test_where_much_is_left_look_alikes_are_entered_before_anything_joins(
+    left: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search = Rounds([left], True, monkeypatch)
+    end = SimpleNamespace(names=frozenset({9}), fit=1.02, bic=-9000.0)
+    monkeypatch.setattr(module, "_among_look_alikes", lambda *_: end)
+    assert found(search) is (end if left > 1.15 else search.sets[0])
+    assert search.continued == 0
+
+
+def test_a_hull_that_got_the_pole_of_its_plane_s_lag_gets_its_own_back() -> None:
+    names = frozenset({"actuator_lag", "munk_moment"})
+    structure = structure_of(names)
+    known = {**BASE, "a2": -4.0, "a3": -3.0, "heave_offset": 0.0, "pitch_offset": 0.0}
+    known |= {"c_qw": 0.5, "lag_time": 0.1}
+    true = np.array([known[name] for name in structure.names])
+    rows = hidden_dive(duration=60.0)
+    pitch, depth = free_run(true, AT_REST, inputs_of(rows, structure)).outputs
+    noise = np.array([[1e-3], [5e-3]]) * np.random.default_rng(1).standard_normal((2, rows.time.size))
+    fitter = Fitter([replace(rows, pitch=pitch + noise[0], depth=depth + noise[1])])
+    swapped = with_poles_swapped(Point(structure, true, [AT_REST], np.array([1e-6, 2.5e-5, 0.0, 0.0])))[0]
+    early = output_error(swapped, fitter.inputs(names), fitter.free(names), most_iterations=2)
+    wrong = fitter.explained(names, early)
+    lag = structure.names.index("lag_time")
+    assert wrong.fit.parameters[lag] > 0.2
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.base)
+        found = module._among_look_alikes(search, wrong)
+    assert found.fit.parameters[lag] == pytest.approx(0.1, abs=0.01)
+    assert found.bic < wrong.bic - 100.0
+    assert search.tried[names].bic == found.bic
 
 
 @pytest.mark.parametrize(("left", "is_asked"), [(1.05, False), (1.6, True)])
