@@ -37,11 +37,9 @@ def together(search: "Search", leading: Explanation) -> Explanation | None:
     takes longest.
     """
     search.on_progress("what every vehicle has")
-    fitter, best = search.fitter, with_ordinary(search, leading)
-    if fitter.excess(best.fit) > LITTLE:
-        best = _among_look_alikes(search, best)
-    if fitter.excess(best.fit) < MUCH:
-        best = with_more(search, best)
+    fitter, best = search.fitter, _with_few_more(search, with_ordinary(search, leading))
+    if fitter.excess(best.fit) > LITTLE and (alike := _among_look_alikes(search, best)) is not best:
+        best = _with_few_more(search, alike)
     if search.asks_drift and fitter.excess(best.fit) > LITTLE:
         search.on_progress("sensors that wander, gusts")
         search.adrift = plain_drift(fitter, best)
@@ -53,6 +51,11 @@ def together(search: "Search", leading: Explanation) -> Explanation | None:
         return None
     best = pruned(search, best)
     return best if best.bic < leading.bic else None
+
+
+def _with_few_more(search: "Search", best: Explanation) -> Explanation:
+    """The set with what else promises most, where so little is left that it will do."""
+    return with_more(search, best) if search.fitter.excess(best.fit) < MUCH else best
 
 
 def with_more(search: "Search", best: Explanation, least: float = LITTLE) -> Explanation:
@@ -115,10 +118,11 @@ def _among_look_alikes(search: "Search", best: Explanation) -> Explanation:
     A lag that joins a leading effect which had its work to do may leave the hull the lag's pole and take one
     of the hull's, from where no fit comes back.
     """
-    best = best.lean()
-    here = Point(best.fit.structure, best.fit.parameters, best.fit.initial, best.fit.noise)
-    tasks: list[Task] = [(Fitter.entered, (start, best)) for start in look_alikes(here)]
-    return search.remember(min([best, *search.workers.results(tasks)], key=lambda e: e.bic))
+    fit, rival = best.fit, best.lean()
+    here = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+    tasks: list[Task] = [(Fitter.entered, (start, rival)) for start in look_alikes(here)]
+    found = min(search.workers.results(tasks), key=lambda e: e.bic, default=best)
+    return search.remember(found) if found.bic < best.bic - margin(best) else best
 
 
 def _by_continuation(search: "Search") -> Explanation | None:

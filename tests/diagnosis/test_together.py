@@ -103,7 +103,7 @@ def test_what_is_left_within_the_doubt_about_the_sensors_is_enough(monkeypatch: 
 
 
 @pytest.mark.parametrize("left", [1.05, 1.6])
-def test_where_much_is_left_look_alikes_are_entered_before_anything_joins(
+def test_where_much_is_left_look_alikes_are_entered_before_a_continuation(
     left: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     search = Rounds([left], True, monkeypatch)
