@@ -12,7 +12,7 @@ from host.catalogue.kin import OFFSETS, as_trim
 from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import SWINGING_MOMENT
 from host.diagnosis.explanation import Explanation, Names
-from host.diagnosis.fitter import Fitter
+from host.diagnosis.fitter import LINEAR, Fitter
 from host.diagnosis.leftover import Leftover, leftover
 from host.diagnosis.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, ROUGH, margin
 from host.diagnosis.sea_fits import (
@@ -31,6 +31,9 @@ from host.diagnosis.workers import Workers
 from host.waves import is_sea, mean_moment
 
 MOSTLY = 0.7  # of what waves explain: of true ones a linear hull explains at most 0.4, of false ones 0.9
+PARTLY = (
+    0.2  # of what waves explain more than white forces: of true ones at most 0.02, of false ones 0.3 and more
+)
 MEAN_MOMENTS = 2.0  # of what it may be: four seas came to 1.0 to 1.3
 
 
@@ -156,12 +159,19 @@ def plain_waves(fitter: Fitter) -> Explanation | None:
     if roughly_with_waves(fitter, sea).bic > sea.bic - NAMING_MARGIN:
         return None
     waves = with_waves(fitter, sea)
-    return waves if is_sea(waves.fit) and not _follow_the_plane(fitter, waves) else None
+    return waves if is_sea(waves.fit) and not _follow_the_plane(fitter, sea, waves) else None
 
 
-def _follow_the_plane(fitter: Fitter, waves: Explanation) -> bool:
-    """Whether what passes for waves is mostly what the plane does to any hull."""
-    least = as_filtered(fitter, fitter.root).bic
+def _follow_the_plane(fitter: Fitter, sea: Explanation, waves: Explanation) -> bool:
+    """Whether what passes for waves is mostly what the plane does to any hull, or in part to one in a sea.
+
+    Of a hull that is unstable only a filter tells that: no free run follows its linear part alone.
+    """
+    hull, least = sea, as_filtered(fitter, fitter.root).bic
+    for name in LINEAR:
+        hull = fitter.grown(hull, name, [])
+    if sea.bic - hull.bic > PARTLY * (sea.bic - waves.bic):
+        return True
     return least - as_filtered(fitter, fitter.linear).bic > MOSTLY * (least - waves.bic)
 
 

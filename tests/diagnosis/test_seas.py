@@ -113,15 +113,25 @@ def test_what_only_passes_for_waves_is_none(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> None:
     fitter = Fitter([hidden_dive(lambda _, x, __: (0.0, 2.0 * x[0], 0.0), duration=60.0)])
-    as_good = replace(fitter.root, bic=fitter.linear.bic)
-    gain = fitter.root.bic - as_good.bic
+    sea = with_sea(fitter, fitter.root)
+    gain = fitter.root.bic - fitter.linear.bic
     assert gain > 1000.0
-    assert _follow_the_plane(fitter, as_good)
-    assert not _follow_the_plane(fitter, replace(as_good, bic=as_good.bic - gain))  # twice as much
+
+    def follow(bic: float) -> bool:
+        return _follow_the_plane(fitter, sea, replace(sea, bic=bic))
+
+    monkeypatch.setattr("host.diagnosis.seas.PARTLY", np.inf)
+    assert follow(fitter.linear.bic)
+    assert not follow(fitter.linear.bic - gain)  # twice as much
+    monkeypatch.undo()
+    monkeypatch.setattr("host.diagnosis.seas.MOSTLY", np.inf)
+    assert follow(sea.bic - 20.0)  # among white forces a linear hull explains more than that
+    assert not follow(sea.bic - 100.0 * gain)
+    monkeypatch.undo()
     rough = Fitter([hidden_dive(in_waves(lambda *_: (0.0, 0.0, 0.0), 0.02, 0.06), duration=60.0)])
     waves = plain_waves(rough)
     assert waves is not None
-    assert not _follow_the_plane(rough, waves)
+    assert not _follow_the_plane(rough, with_sea(rough, rough.root), waves)
     monkeypatch.setattr("host.diagnosis.seas._follow_the_plane", lambda *_: True)
     assert plain_waves(rough) is None
 
