@@ -72,7 +72,7 @@ def _region(recording: Recording, errors: Array, floor: Array, speed: float) -> 
     }
     strongest, relation, text = "", 0.0, ""
     for name, (values, unit) in quantities.items():
-        if np.ptp(values) <= 0.0:
+        if np.ptp(values) <= 0.0 or np.ptp(growth) <= 0.0:
             continue
         rho = float(spearmanr(values, growth).statistic)
         if abs(rho) > abs(relation):
