@@ -1,7 +1,7 @@
 """The whole diagnosis: search, doubt, prove, locate."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from typing import NamedTuple
 
@@ -104,11 +104,13 @@ def diagnose(
 
     like  an explanation of a vehicle that this one should resemble: if of many effects, it is begun with
 
-    Raises RecordingError with one line where a recording is too short, or pitch or depth never changes or is hardly read.
+    Raises RecordingError with one line where a recording is too short, or pitch or depth never changes or
+    is hardly ever read.
     """
     _check_readings(recordings)
     on_progress("base model")
-    first, *others = by_single_effects(ways(as_sensed(without_outliers(recordings))), on_progress, jobs)
+    seen = as_sensed(without_outliers(_with_plane_told(recordings)))
+    first, *others = by_single_effects(ways(seen), on_progress, jobs)
     return _diagnosed(first, others, on_progress, jobs, like)
 
 
@@ -125,6 +127,16 @@ def _check_readings(recordings: list[Recording]) -> None:
             )
         if all(np.nanmax(one) == np.nanmin(one) for one in values if np.isfinite(one).any()):
             raise RecordingError(f"{name}: {channel} never changes: there is no motion to explain")
+
+
+def _with_plane_told(recordings: list[Recording]) -> list[Recording]:
+    """With a note where the plane never moves: what was read may be something else."""
+    if any(np.ptp(recording.rudder) > 0.0 for recording in recordings):
+        return recordings
+    note = (
+        "the plane never moves: nothing is learnt of what it does (is its column or message the right one?)"
+    )
+    return [replace(recording, notes=(*recording.notes, note)) for recording in recordings]
 
 
 def _diagnosed(

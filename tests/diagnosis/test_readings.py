@@ -36,3 +36,9 @@ def short(recording: Recording) -> Recording:
 def test_nothing_is_learnt_from_them(spoilt: Callable[[Recording], Recording], why: str) -> None:
     with pytest.raises(RecordingError, match=why):
         diagnose([spoilt(hidden_dive(duration=60.0))])
+
+
+def test_a_plane_that_never_moves_is_told() -> None:
+    dive = hidden_dive(duration=30.0)
+    found = diagnose([replace(dive, rudder=np.zeros_like(dive.rudder), pitch=0.01 * dive.pitch)])
+    assert any(note.startswith("the plane never moves") for note in found.recordings[0].notes)
