@@ -1,7 +1,7 @@
 """The whole diagnosis: search, doubt, prove, locate."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import inf
 from typing import NamedTuple
 
@@ -22,21 +22,20 @@ from host.diagnosis.sea_fits import WAVES, again_in_waves, again_under_forces, w
 from host.diagnosis.search import Search
 from host.diagnosis.seas import Explained, Waves, evidence
 from host.diagnosis.sensed import as_sensed
-from host.diagnosis.spans import LEAST_MEASURED, Spans, divide, excerpt
+from host.diagnosis.spans import Spans, divide, excerpt
 from host.diagnosis.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.unknown_physics import known_in
+from host.diagnosis.usable import check_usable, with_plane_told
 from host.diagnosis.verdict import Verdict, remaining, verdict_on
 from host.diagnosis.whole_vehicle import beside_all, in_the_valley_of, widened
 from host.diagnosis.workers import Workers
 from host.equations import NAMES, Slot
-from host.errors import RecordingError
 from host.identifiability import ambiguity
 from host.noise_floor import noise_floor
 from host.outliers import without_outliers
 from host.recording import Array, Recording
 
 HORIZON = 5.0  # s
-SHORTEST = 2.0 * HORIZON
 MOST_WORTH = 1e9  # of BIC: without some effects the equations run away
 SLOTS: tuple[Slot, ...] = ("heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment")
 
@@ -107,36 +106,11 @@ def diagnose(
     Raises RecordingError with one line where a recording is too short, or pitch or depth never changes or
     is hardly ever read.
     """
-    _check_readings(recordings)
+    check_usable(recordings)
     on_progress("base model")
-    seen = as_sensed(without_outliers(_with_plane_told(recordings)))
+    seen = as_sensed(without_outliers(with_plane_told(recordings)))
     first, *others = by_single_effects(ways(seen), on_progress, jobs)
     return _diagnosed(first, others, on_progress, jobs, like)
-
-
-def _check_readings(recordings: list[Recording]) -> None:
-    name, longest = recordings[0].name, max(recording.duration for recording in recordings)
-    if longest < SHORTEST:
-        raise RecordingError(f"{name}: {longest:.3g} s are too short; at least {SHORTEST:.0f} s are needed")
-    for channel in ("pitch", "depth"):
-        values = [getattr(recording, channel) for recording in recordings]
-        count = sum(int(np.isfinite(one).sum()) for one in values)
-        if count < LEAST_MEASURED:
-            raise RecordingError(
-                f"{name}: {channel} has {count} readings; at least {LEAST_MEASURED} are needed"
-            )
-        if all(np.nanmax(one) == np.nanmin(one) for one in values if np.isfinite(one).any()):
-            raise RecordingError(f"{name}: {channel} never changes: there is no motion to explain")
-
-
-def _with_plane_told(recordings: list[Recording]) -> list[Recording]:
-    """With a note where the plane never moves: what was read may be something else."""
-    if any(np.ptp(recording.rudder) > 0.0 for recording in recordings):
-        return recordings
-    note = (
-        "the plane never moves: nothing is learnt of what it does (is its column or message the right one?)"
-    )
-    return [replace(recording, notes=(*recording.notes, note)) for recording in recordings]
 
 
 def _diagnosed(
