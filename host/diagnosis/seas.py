@@ -31,9 +31,7 @@ from host.diagnosis.workers import Workers
 from host.waves import is_sea, mean_moment
 
 MOSTLY = 0.7  # of what waves explain: of true ones a linear hull explains at most 0.4, of false ones 0.9
-PARTLY = (
-    0.2  # of what waves explain more than white forces: of true ones at most 0.02, of false ones 0.3 and more
-)
+PARTLY = 0.2  # of what waves gain over white forces: of true ones at most 0.02, of false ones 0.3 and more
 MEAN_MOMENTS = 2.0  # of what it may be: four seas came to 1.0 to 1.3
 
 

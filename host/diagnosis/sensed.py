@@ -12,9 +12,7 @@ import numpy as np
 from host.noise_floor import noise_floor
 from host.recording import Array, Recording
 
-SMOOTH = np.array(
-    [radians(0.01), 0.001]
-)  # rad, m: deviations of white noise that no vehicle's sensors go below
+SMOOTH = np.array([radians(0.01), 0.001])  # rad, m: deviations of white noise; no vehicle's sensors have less
 USUAL = np.array([radians(0.05), 0.005])  # of that of good ones
 SEED = 0
 
@@ -29,9 +27,8 @@ def as_sensed(recordings: list[Recording]) -> list[Recording]:
         return recordings
     pitch, depth = lacking.tolist()
     rng = np.random.default_rng(SEED)
-    told = [f"{degrees(pitch):.2g} deg in pitch"] * (pitch > 0.0) + [f"{1e3 * depth:.2g} mm in depth"] * (
-        depth > 0.0
-    )
+    told = [f"{degrees(pitch):.2g} deg in pitch"] if pitch else []
+    told += [f"{1e3 * depth:.2g} mm in depth"] if depth else []
     note = f"smoother than sensors are: seen with white noise of {' and '.join(told)}"
     return [
         replace(

@@ -87,7 +87,7 @@ def cancelling_in(explanation: Explanation) -> list[str]:
 
 
 def beyond_bounds_in(explanation: Explanation) -> list[str]:
-    """The effects with a coefficient that ends at the largest value its bounds allow, and is known there.
+    """The effects with a size that ends at the largest value its bounds allow, and is known there.
 
     It would be larger still if it could: what no vehicle has does the work of something else. Not asked of
     a share: the whole is natural, and in more than that another detail of the same geometry shows.
@@ -99,7 +99,7 @@ def beyond_bounds_in(explanation: Explanation) -> list[str]:
     for effect in map(BY_NAME.__getitem__, known_in(explanation)):
         for parameter in effect.parameters:
             is_share = parameter.unit == "1" and parameter.lower >= 0.0 and parameter.upper <= LARGEST_SHARE
-            if parameter.name not in names or is_share:
+            if parameter.name not in effect.size_names or parameter.name not in names or is_share:
                 continue
             k, largest = names.index(parameter.name), max(abs(parameter.lower), abs(parameter.upper))
             if fit.free[k] and abs(fit.parameters[k]) > NEARLY * largest and std[k] < KNOWN * largest:
