@@ -34,10 +34,9 @@ def slower(time: float, x: Array, plane: float) -> tuple[float, float, float]:
 @pytest.mark.parametrize(
     ("extra", "name", "parameter", "size"),
     [
-        (trim, "trim_moment_change", "c_qb", 0.05),
-        (slower, "speed_change", "speed_step", -0.1),
+        pytest.param(trim, "trim_moment_change", "c_qb", 0.05, id="trim", marks=pytest.mark.long),
+        pytest.param(slower, "speed_change", "speed_step", -0.1, id="slower"),
     ],
-    ids=["trim", "slower"],
 )
 def test_what_changed_is_named_with_its_size_and_its_moment(
     extra: Extra, name: str, parameter: str, size: float

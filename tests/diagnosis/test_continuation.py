@@ -128,7 +128,8 @@ def test_where_nothing_else_acts_nothing_joins() -> None:
     assert fitter.excess(fitter.polished(found).fit) < 1.15
 
 
-@pytest.mark.parametrize("rows", [900, 1400])  # of the shorter one the first end lies in a side valley
+# Of the shorter one the first end lies in a side valley.
+@pytest.mark.parametrize("rows", [900, pytest.param(1400, marks=pytest.mark.long)])
 def test_a_long_hull_that_meets_the_water_differently_at_either_end(rows: int) -> None:
     fitter = Fitter([dive(LONG, drag=along_the_hull, rows=rows)])
     with Workers(fitter, 1) as workers:

@@ -8,6 +8,7 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.diagnosis.diagnose import diagnose
+from host.diagnosis.usable import with_plane_told
 from host.errors import RecordingError
 from host.recording import Recording
 
@@ -40,5 +41,8 @@ def test_nothing_is_learnt_from_them(spoilt: Callable[[Recording], Recording], w
 
 def test_a_plane_that_never_moves_is_told() -> None:
     dive = hidden_dive(duration=30.0)
-    found = diagnose([replace(dive, rudder=np.zeros_like(dive.rudder), pitch=0.01 * dive.pitch)])
-    assert any(note.startswith("the plane never moves") for note in found.recordings[0].notes)
+    still = replace(dive, rudder=np.full_like(dive.rudder, 0.1))
+    both = [dive, still]
+    assert with_plane_told(both) is both
+    (told,) = with_plane_told([still])
+    assert told.notes[-1].startswith("the plane never moves: nothing is learnt of what it does")
