@@ -38,6 +38,7 @@ def test_drag_on_one_side_of_the_keel_is_none_of_the_catalogue() -> None:
     assert found.slots["heave"] == max(found.slots.values())
 
 
+@pytest.mark.long
 def test_a_mass_that_turns_is_unexplained_and_described(tmp_path: Path) -> None:
     def turning(time: float, _: np.ndarray, __: float) -> tuple[float, float, float]:  # type: ignore[type-arg]
         return 0.0, 0.08 * np.sin(2.0 * np.pi * time / 11.0), 0.0
@@ -112,6 +113,7 @@ def test_what_wanders_with_time_gives_way_to_what_every_vehicle_has(monkeypatch:
         assert not search._is_only_flexible(motion, fitter.root)
 
 
+@pytest.mark.long
 def test_a_plane_that_bites_better_to_one_side_is_told_by_its_force_and_moment_together() -> None:
     def one_sided(_: float, __: np.ndarray, plane: float) -> tuple[float, float, float]:  # type: ignore[type-arg]
         beyond = 0.2 * abs(plane)
