@@ -61,11 +61,12 @@ def run(args: argparse.Namespace) -> int:
     jobs = args.jobs if args.jobs is not None else min(8, len(os.sched_getaffinity(0)))
     vehicle = load_vehicle(args.vehicle)
     require_bench()
+    from host.afloat import under_water
     from host.model import read_model
 
     model = read_model(args.model) if args.model is not None else None
     with progress(args.quiet) as say:
-        recordings = _part(read_all(args.recordings, vehicle, say), args)
+        recordings = _part(under_water(read_all(args.recordings, vehicle, say)), args)
         from host.catalogue import named
         from host.diagnosis.answer import Answer
         from host.diagnosis.deviations import interval

@@ -28,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     require_bench()
+    from host.afloat import under_water
     from host.identify import identify
     from host.model import write_model
     from host.report import advice, unit_of, write_report
@@ -36,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     vehicle = load_vehicle(args.vehicle)
     worst = 0
     with progress(args.quiet) as say:
-        read = read_all(args.recordings, vehicle, say)
+        read = under_water(read_all(args.recordings, vehicle, say))
         for recordings, folder in joint_or_each(read, args.out, args.each):
             result = identify(recordings, vehicle, args.method, say)
             folder.mkdir(parents=True, exist_ok=True)

@@ -4,7 +4,7 @@ import argparse
 import json
 from pathlib import Path
 
-from tools.bench import load_vehicle, read_all, require_bench
+from tools.bench import load_vehicle, read_all, require_bench, tell_notes
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,12 +18,14 @@ def run(args: argparse.Namespace) -> int:
     require_bench()
     import numpy as np
 
+    from host.afloat import under_water
     from host.model import read_model
     from host.predict import predict, score
 
     model = read_model(args.model)
-    recordings = read_all([args.recording], load_vehicle(args.vehicle), lambda _: None)
+    recordings = under_water(read_all([args.recording], load_vehicle(args.vehicle), lambda _: None))
     runs = [predict(model, recording) for recording in recordings]
+    tell_notes(recordings)
     total = score(np.hstack([run.outputs for run in runs]), [run.recording for run in runs])
     print(
         f"depth {total.depth_rmse_m:.4f} m rms ({total.depth_fit_percent:.2f} %), "

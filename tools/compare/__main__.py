@@ -40,6 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     require_bench()
+    from host.afloat import under_water
     from tools.compare.held_out import compare, median_of, table_of
     from tools.compare.methods import EXTENDED, LINEAR, extended_model, installed, linear_model, missing
 
@@ -51,7 +52,7 @@ def _run(args: argparse.Namespace) -> int:
     warnings.simplefilter("ignore")  # the packages warn at every setting that does not suit
     with progress(args.quiet) as say:
         for path in args.recordings:
-            lines = compare(read_all([path], vehicle, say), say, methods)
+            lines = compare(under_water(read_all([path], vehicle, say)), say, methods)
             everything.append(lines)
             print(f"{path.name}\n{table_of(lines)}\n", flush=True)
             document[path.name] = [
