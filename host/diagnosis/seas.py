@@ -163,13 +163,17 @@ def plain_waves(fitter: Fitter) -> Explanation | None:
 def _follow_the_plane(fitter: Fitter, sea: Explanation, waves: Explanation) -> bool:
     """Whether what passes for waves is mostly what the plane does to any hull, or in part to one in a sea.
 
-    Of a hull that is unstable only a filter tells that: no free run follows its linear part alone.
+    Of a hull that is unstable only a filter tells that: no free run follows its linear part alone. True waves
+    gain more beside the right hull, what passes for them less.
     """
     hull, least = sea, as_filtered(fitter, fitter.root).bic
     for name in LINEAR:
         hull = fitter.grown(hull, name, [])
-    if sea.bic - hull.bic > PARTLY * (sea.bic - waves.bic):
-        return True
+    gain = sea.bic - waves.bic
+    if sea.bic - hull.bic > PARTLY * gain:
+        beside = with_waves(fitter, hull)
+        if not is_sea(beside.fit) or hull.bic - beside.bic < gain:
+            return True
     return least - as_filtered(fitter, fitter.linear).bic > MOSTLY * (least - waves.bic)
 
 

@@ -127,6 +127,13 @@ def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr("host.diagnosis.seas.MOSTLY", np.inf)
     assert follow(sea.bic - 20.0)  # among white forces a linear hull explains more than that
     assert not follow(sea.bic - 100.0 * gain)
+    monkeypatch.setattr("host.diagnosis.seas.is_sea", lambda _: True)
+    for beside_the_hull, is_followed in ((10.0, True), (30.0, False)):  # true waves gain more there
+        monkeypatch.setattr(
+            "host.diagnosis.seas.with_waves",
+            lambda _, hull, gained=beside_the_hull: replace(hull, bic=hull.bic - gained),
+        )
+        assert follow(sea.bic - 20.0) == is_followed
     monkeypatch.undo()
     rough = Fitter([hidden_dive(in_waves(lambda *_: (0.0, 0.0, 0.0), 0.02, 0.06), duration=60.0)])
     waves = plain_waves(rough)
