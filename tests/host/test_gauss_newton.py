@@ -46,7 +46,9 @@ def test_a_step_is_the_best_within_its_bounds(seed: int, drag: float, share: flo
     least, reached = (float(np.sum((error - S @ step) ** 2)) for step in (best, moved))
     # What has once met its bound stays there for this step; on these problems that costs hardly anything.
     assert reached <= 1.15 * least + 1.0
-    assert problem.predicted_cost(float(error @ error)) == pytest.approx(reached, rel=1e-6)
+    cost = float(error @ error)
+    assert cost - 2.0 * problem.promise() == pytest.approx(reached, rel=1e-6)
+    assert problem.predicted_cost(cost) <= reached * (1.0 + 1e-6)
 
 
 def test_the_others_make_up_for_what_stops_at_its_bound() -> None:
@@ -67,3 +69,22 @@ def test_where_the_slopes_leave_the_numbers_nothing_is_promised_and_no_step_take
     lost = step.with_normal([(np.full((S.shape[1] + 4,) * 2, np.inf), np.zeros(S.shape[1] + 4))])
     assert lost.promise() == 0.0
     assert lost.trial(1.0) is lost.point
+
+
+def test_what_stops_early_on_a_ridge_hides_no_gain() -> None:
+    """Two sensitivities that hardly differ: the full step goes far, until both are at their bounds."""
+    rng = np.random.default_rng(5)
+    values = np.zeros(len(NAMES))
+    values[NAMES.index("a1")], values[NAMES.index("a2")] = -1.0, -1.0
+    values[NAMES.index("u0")], values[DRAG], values[SHARE] = 2.0, -1.0, 1.0
+    scores = np.zeros((2, len(NAMES) + 4, 200))
+    common = rng.standard_normal((2, 200))
+    scores[:, NAMES.index("u0")] = common
+    scores[:, DRAG] = common + 1e-4 * rng.standard_normal((2, 200))
+    scores[:, SHARE] = rng.standard_normal((2, 200))
+    error = 0.8 * scores[:, SHARE] + 0.1 * rng.standard_normal((2, 200))
+    error += 3e3 * (scores[:, DRAG] - scores[:, NAMES.index("u0")]) + 0.5 * common
+    point = Point(STRUCTURE, values, [np.zeros(4)], np.array([1.0, 1.0, 0.0, 0.0]))
+    step, cost = GaussNewton([(error, scores)], point, FREE), float(np.sum(error**2))
+    assert step.promise() < 0.0
+    assert step.predicted_cost(cost) < 0.8 * cost
