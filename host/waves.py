@@ -24,7 +24,7 @@ from host.ascent import ascend, place
 from host.catalogue.environment import WAVE_PERIODS
 from host.catalogue.gravity import GRAVITY
 from host.equations import Chain, Effect, Parameter, Structure
-from host.filter_error import RandomForces
+from host.filter_error import RandomForces, whitened_by
 from host.fit import Fit, finished, run_away
 from host.gauss_newton import Mask, Point
 from host.kalman import KalmanPass, kalman_pass
@@ -178,10 +178,26 @@ def mean_moment(fit: Fit) -> float:
     return float(abs(fit.parameters[A2]) * ((turn * s) ** 2 * rising + turning) / s)
 
 
-def whitened_in_waves(point: Point, inputs: list[Inputs]) -> list[tuple[Array, Array]]:
-    """Innovations over their deviation (2, N) and their sensitivities, waves in the point's noise (7,)."""
+def passes_in_waves(point: Point, inputs: list[Inputs]) -> list[KalmanPass]:
+    """The filter over each recording, waves in the point's noise (7,)."""
     model, wider = _among(point, inputs)
-    return _less_shape(model.whitened(wider, model.passes(wider)), point.parameters.size)
+    return model.passes(wider)
+
+
+def whitened_in_waves(
+    point: Point, inputs: list[Inputs], steering: list[KalmanPass] | None = None, states: tuple[str, ...] = ()
+) -> list[tuple[Array, Array]]:
+    """Innovations over their deviation (2, N) and their sensitivities, waves in the point's noise (7,).
+
+    steering  another filter in these waves, whose gains do; `states` are its vehicle's own
+    """
+    model, wider = _among(point, inputs)
+    if steering is None:
+        white = model.whitened(wider, model.passes(wider))
+    else:
+        shaped = replace(wider, parameters=_shaped(wider))
+        white = whitened_by(shaped, model.inputs, steering, (*states, *(wave.name for wave in WAVES)))
+    return _less_shape(white, point.parameters.size)
 
 
 def _among(point: Point, inputs: list[Inputs]) -> tuple[InWaves, Point]:

@@ -18,7 +18,7 @@ from host.kalman import KalmanPass
 from host.output_error import diverges, residuals_at
 from host.propagate import Inputs
 from host.recording import Array
-from host.waves import whitened_in_waves
+from host.waves import passes_in_waves, whitened_in_waves
 
 if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
@@ -114,10 +114,11 @@ def _steering(fitter: "Fitter", parent: Explanation, effect: Effect) -> list[Kal
     """
     fit = parent.fit
     is_corrected = effect.state is not None and effect.actuator is None
-    if is_corrected or not fit.has_process_noise or fit.waves.any():
+    if is_corrected or not fit.has_process_noise:
         return None
     point = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
-    return RandomForces(fitter.inputs(parent.names, for_filter=True)).passes(point)
+    inputs = fitter.inputs(parent.names, for_filter=True)
+    return passes_in_waves(point, inputs) if fit.waves.any() else RandomForces(inputs).passes(point)
 
 
 def whitened_at(
@@ -134,7 +135,7 @@ def whitened_at(
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if parent.fit.waves.any():
-            white = whitened_in_waves(point, inputs)
+            white = whitened_in_waves(point, inputs, steering, parent.fit.structure.states)
         elif steering is not None:
             white = whitened_by(point, inputs, steering, parent.fit.structure.states)
         elif parent.fit.has_process_noise:
