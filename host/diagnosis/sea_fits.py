@@ -12,7 +12,7 @@ from host.fit import Fit
 from host.gauss_newton import Point
 from host.output_error import output_error
 from host.recording import Array
-from host.waves import in_waves, in_waves_from
+from host.waves import MOST_STEPS, in_waves, in_waves_from
 
 WAVES = "surface_waves"
 FEW_STEPS = 4
@@ -40,11 +40,12 @@ def as_filtered(fitter: Fitter, explanation: Explanation) -> Explanation:
 
 def roughly_with_waves(fitter: Fitter, explanation: Explanation) -> Explanation:
     """A set among white forces, among waves in their place: a few steps, to see whether that is likelier."""
-    inputs = fitter.inputs(explanation.names, for_filter=True)
-    return fitter.explained(explanation.names, in_waves(explanation.fit, inputs, FEW_STEPS))
+    return with_waves(fitter, explanation, most_steps=FEW_STEPS)
 
 
-def with_waves(fitter: Fitter, explanation: Explanation, waves: Fit | None = None) -> Explanation:
+def with_waves(
+    fitter: Fitter, explanation: Explanation, waves: Fit | None = None, most_steps: int = MOST_STEPS
+) -> Explanation:
     """The same set among waves: the likeliest ones, or those of another fit, held.
 
     Whatever grows from it is fitted in these waves.
@@ -52,7 +53,7 @@ def with_waves(fitter: Fitter, explanation: Explanation, waves: Fit | None = Non
     free, fit = fitter.free(explanation.names), explanation.fit
     inputs = fitter.inputs(explanation.names, for_filter=True)
     if waves is None and not fit.waves.any():
-        return fitter.explained(explanation.names, in_waves(fit, inputs))
+        return fitter.explained(explanation.names, in_waves(fit, inputs, most_steps))
     start = Point(fit.structure, fit.parameters, fit.initial, (fit if waves is None else waves).levels)
     climbed = in_waves_from(start, inputs, free, holds_noise=waves is not None)
     return fitter.explained(explanation.names, climbed)

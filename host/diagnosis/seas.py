@@ -28,10 +28,12 @@ from host.diagnosis.search import Search
 from host.diagnosis.speed_forces import are_by_speed
 from host.diagnosis.trims import retrimmed
 from host.diagnosis.workers import Workers
-from host.waves import is_sea, mean_moment
+from host.waves import MOST_STEPS, is_sea, mean_moment
 
 MOSTLY = 0.7  # of what waves explain: of true ones a linear hull explains at most 0.4, of false ones 0.9
 PARTLY = 0.2  # of what waves gain over white forces: of true ones at most 0.02, of false ones 0.3 and more
+NARROW = 0.26  # band of a fully developed sea; of true ones 0.03 to 0.17 was found beside a linear hull
+SOME_STEPS = 8
 MEAN_MOMENTS = 2.0  # of what it may be: four seas came to 1.0 to 1.3
 
 
@@ -144,37 +146,55 @@ def _rough(calm: Search, best: Explanation, sets: list[Explanation]) -> tuple[Se
 
 
 def plain_waves(fitter: Fitter) -> Explanation | None:
-    """The root among waves, where these are likelier than white forces, and those than none.
+    """The root among waves, where these are plain to see: likelier than white forces, and than none.
 
-    Not where the water would have to follow the plane.
+    Beside the root alone, unless the water would have to follow the plane; or beside a linear hull, of which
+    a slow plane or an autopilot hides them.
     """
     root = fitter.root
     if fitter.excess(root.fit) < LITTLE:
         return None
-    sea = with_sea(fitter, root)
-    if sea.bic > as_filtered(fitter, root).bic - NAMING_MARGIN:
+    sea, calm = with_sea(fitter, root), as_filtered(fitter, root).bic
+    hull, waves, least = _linear_in(fitter, sea), None, min(sea.bic, calm)
+    if roughly_with_waves(fitter, sea).bic < least - NAMING_MARGIN:
+        waves = with_waves(fitter, sea)
+        if is_sea(waves.fit) and not _follow_the_plane(fitter, sea, hull, waves):
+            return waves
+    if sea.bic > calm - NAMING_MARGIN:
         return None
-    if roughly_with_waves(fitter, sea).bic > sea.bic - NAMING_MARGIN:
-        return None
-    waves = with_waves(fitter, sea)
-    return waves if is_sea(waves.fit) and not _follow_the_plane(fitter, sea, waves) else None
+    beside = _beside_hull(fitter, hull, NAMING_MARGIN if waves is None else least - waves.bic)
+    return None if beside is None else with_waves(fitter, sea, beside.fit)
 
 
-def _follow_the_plane(fitter: Fitter, sea: Explanation, waves: Explanation) -> bool:
+def _follow_the_plane(fitter: Fitter, sea: Explanation, hull: Explanation, waves: Explanation) -> bool:
     """Whether what passes for waves is mostly what the plane does to any hull, or in part to one in a sea.
 
-    Of a hull that is unstable only a filter tells that: no free run follows its linear part alone. True waves
-    gain more beside the right hull, what passes for them less.
+    Of a hull that is unstable only a filter tells that: no free run follows its linear part alone.
     """
-    hull, least = sea, as_filtered(fitter, fitter.root).bic
+    least = as_filtered(fitter, fitter.root).bic
+    if sea.bic - hull.bic > PARTLY * (sea.bic - waves.bic):
+        return True
+    return least - as_filtered(fitter, fitter.linear).bic > MOSTLY * (least - waves.bic)
+
+
+def _linear_in(fitter: Fitter, sea: Explanation) -> Explanation:
+    """A linear hull among the white forces of a sea."""
+    hull = sea
     for name in LINEAR:
         hull = fitter.grown(hull, name, [])
-    gain = sea.bic - waves.bic
-    if sea.bic - hull.bic > PARTLY * gain:
-        beside = with_waves(fitter, hull)
-        if not is_sea(beside.fit) or hull.bic - beside.bic < gain:
-            return True
-    return least - as_filtered(fitter, fitter.linear).bic > MOSTLY * (least - waves.bic)
+    return hull
+
+
+def _beside_hull(fitter: Fitter, hull: Explanation, gain: float) -> Explanation | None:
+    """A hull among waves, where these gain more BIC beside it than alone; what passes for waves less.
+
+    A few steps show whether their band is narrow: of what the hull lacks, it is as broad as may be.
+    """
+    for steps in (SOME_STEPS, MOST_STEPS):
+        beside = with_waves(fitter, hull, most_steps=steps)
+        if not (is_sea(beside.fit) and beside.fit.waves[1] < NARROW):
+            return None
+    return beside if hull.bic - beside.bic > gain else None
 
 
 def in_plain_waves(calm: Search, waves: Explanation) -> Explained:

@@ -11,12 +11,14 @@ from host.diagnosis.diagnose import _judge, _unnamed, diagnose
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
-from host.diagnosis.sea_fits import with_sea
+from host.diagnosis.sea_fits import with_sea, with_waves
 from host.diagnosis.search import Search
 from host.diagnosis.seas import (
     Explained,
     Waves,
+    _beside_hull,
     _follow_the_plane,
+    _linear_in,
     _of_the_waves,
     _rough,
     against,
@@ -114,11 +116,12 @@ def test_what_only_passes_for_waves_is_none(monkeypatch: pytest.MonkeyPatch) -> 
 def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> None:
     fitter = Fitter([hidden_dive(lambda _, x, __: (0.0, 2.0 * x[0], 0.0), duration=60.0)])
     sea = with_sea(fitter, fitter.root)
+    hull = _linear_in(fitter, sea)
     gain = fitter.root.bic - fitter.linear.bic
     assert gain > 1000.0
 
     def follow(bic: float) -> bool:
-        return _follow_the_plane(fitter, sea, replace(sea, bic=bic))
+        return _follow_the_plane(fitter, sea, hull, replace(sea, bic=bic))
 
     monkeypatch.setattr("host.diagnosis.seas.PARTLY", np.inf)
     assert follow(fitter.linear.bic)
@@ -127,19 +130,19 @@ def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr("host.diagnosis.seas.MOSTLY", np.inf)
     assert follow(sea.bic - 20.0)  # among white forces a linear hull explains more than that
     assert not follow(sea.bic - 100.0 * gain)
-    monkeypatch.setattr("host.diagnosis.seas.is_sea", lambda _: True)
-    for beside_the_hull, is_followed in ((10.0, True), (30.0, False)):  # true waves gain more there
-        monkeypatch.setattr(
-            "host.diagnosis.seas.with_waves",
-            lambda _, hull, gained=beside_the_hull: replace(hull, bic=hull.bic - gained),
-        )
-        assert follow(sea.bic - 20.0) == is_followed
     monkeypatch.undo()
     rough = Fitter([hidden_dive(in_waves(lambda *_: (0.0, 0.0, 0.0), 0.02, 0.06), duration=60.0)])
     waves = plain_waves(rough)
     assert waves is not None
-    assert not _follow_the_plane(rough, with_sea(rough, rough.root), waves)
+    sea = with_sea(rough, rough.root)
+    hull = _linear_in(rough, sea)
+    assert not _follow_the_plane(rough, sea, hull, waves)
     monkeypatch.setattr("host.diagnosis.seas._follow_the_plane", lambda *_: True)
+    gain = hull.bic - with_waves(rough, hull).bic
+    assert gain > 100.0
+    assert _beside_hull(rough, hull, 0.9 * gain) is not None  # true waves gain more beside a hull
+    assert _beside_hull(rough, hull, 1.1 * gain) is None
+    monkeypatch.setattr("host.diagnosis.seas.NARROW", 0.02)
     assert plain_waves(rough) is None
 
 
