@@ -89,6 +89,8 @@ class Search:
             return self._settled(min(settled, key=lambda e: e.bic))
         foreign: Explanation | None = None
         for size in range(1, LARGEST_SET + 1):
+            if size == 2 and self._needs_many(beam[0], size):
+                beam = self._with_best_pair(beam)
             is_time = foreign is None and self._needs_many(beam[0], size)
             if is_time and (together(self, beam[0]) is not None or self.is_led_elsewhere):
                 break
@@ -247,6 +249,17 @@ class Search:
         if size == 1 or self.joint or self.is_for_few or self.root.fit.has_process_noise:
             return False
         return self.fitter.excess(leading.fit) > (MUCH if size <= SMALL else LITTLE)
+
+    def _with_best_pair(self, singles: list[Explanation]) -> list[Explanation]:
+        """The sets led by the likeliest pair of the first and another of them, if that leaves less than much.
+
+        Two that each explain much may be all that acts: then a dozen need not join.
+        """
+        first, *others = singles
+        names = [name for one in others for name in one.names - first.names]
+        pairs = [self.remember(e) for e in self.workers.results([self.growth(first, n) for n in names])]
+        best = min(pairs, key=lambda e: e.bic, default=first)
+        return [best, *singles] if self.fitter.excess(best.fit) < MUCH else singles
 
     def _may_be_foreign(self, leading: Explanation) -> bool:
         """Whether one effect leaves so much that a form of unknown physics is worth a look already."""

@@ -17,7 +17,7 @@ from host.diagnosis.pruning import leanest, pruned
 from host.diagnosis.search import Search
 from host.diagnosis.together import completed, together, with_ordinary
 from host.diagnosis.unknown_physics import with_unknown
-from host.diagnosis.workers import Workers
+from host.diagnosis.workers import Task, Workers
 from host.gauss_newton import Point
 from host.output_error import output_error
 from host.propagate import free_run, inputs_of
@@ -202,3 +202,32 @@ def test_a_zero_error_of_the_plane_is_tried_beside_what_depends_on_its_angle() -
         leading = with_offset(search, parents)[0]
     assert leading.names == hidden
     assert fitter.excess(leading.fit) < LITTLE
+
+
+@pytest.mark.parametrize(("left", "is_kept"), [(1.5, True), (3.0, False)])
+def test_two_that_explain_much_each_are_asked_before_a_dozen(
+    left: float, is_kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitter = Fitter([hidden_dive(duration=40.0)])
+    workers = Workers(fitter, 1)
+    search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+    names = ["internal_wave", "actuator_rate_limit", "munk_moment"]
+    singles = [
+        replace(fitter.root, names=fitter.root.names | {name}, bic=fitter.root.bic - less)
+        for name, less in zip(names, (300.0, 200.0, 100.0), strict=True)
+    ]
+    grown: list[str] = []
+
+    def results(tasks: list[Task]) -> list[Explanation]:
+        grown.extend(name for _, (_, name, _) in tasks)
+        return [
+            replace(fitter.root, names=singles[0].names | {name}, bic=fitter.root.bic - 900.0)
+            for _, (_, name, _) in tasks
+        ]
+
+    monkeypatch.setattr(workers, "results", results)
+    monkeypatch.setattr(Fitter, "excess", lambda *_: left)
+    leading = search._with_best_pair(singles)
+    assert grown == names[1:]
+    assert leading[-3:] == singles
+    assert ({"internal_wave", "actuator_rate_limit"} <= leading[0].names) is is_kept
