@@ -160,7 +160,7 @@ def plain_waves(fitter: Fitter) -> Explanation | None:
         waves = with_waves(fitter, sea)
         if is_sea(waves.fit) and not _follow_the_plane(fitter, sea, hull, waves):
             return waves
-    if sea.bic > calm - NAMING_MARGIN:
+    if sea.bic > calm - NAMING_MARGIN or _does_a_linear_hull(fitter, calm - sea.bic):
         return None
     beside = _beside_hull(fitter, hull, NAMING_MARGIN if waves is None else least - waves.bic)
     return None if beside is None else with_waves(fitter, sea, beside.fit)
@@ -171,10 +171,15 @@ def _follow_the_plane(fitter: Fitter, sea: Explanation, hull: Explanation, waves
 
     Of a hull that is unstable only a filter tells that: no free run follows its linear part alone.
     """
-    least = as_filtered(fitter, fitter.root).bic
     if sea.bic - hull.bic > PARTLY * (sea.bic - waves.bic):
         return True
-    return least - as_filtered(fitter, fitter.linear).bic > MOSTLY * (least - waves.bic)
+    return _does_a_linear_hull(fitter, as_filtered(fitter, fitter.root).bic - waves.bic)
+
+
+def _does_a_linear_hull(fitter: Fitter, gain: float) -> bool:
+    """Whether a linear hull gains most of this much BIC without any forces."""
+    calm, hull = (as_filtered(fitter, one).bic for one in (fitter.root, fitter.linear))
+    return calm - hull > MOSTLY * gain
 
 
 def _linear_in(fitter: Fitter, sea: Explanation) -> Explanation:
