@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from host.recording import Array, Recording
 
 AFLOAT, LEFT = 0.5, 1.0  # m: depth of a vehicle at the surface, and by which it has left it
-ABOVE = -1.0  # m: where depth is less than that, it is not counted from the surface
-LONG_ENOUGH = 15.0  # s at the surface; a crest or a shallow leg takes less
+ABOVE = -0.5  # m: where depth is less than that, it is not counted from the surface
+LONG_ENOUGH, MOSTLY = 15.0, 0.5  # s at the surface, and share of what is above `LEFT`: no shallow leg is so
 SMOOTHED = 5.0  # s, of which the median depth counts: a wave or a spike is no dive
 STILL = 0.01  # rad (a unit of another actuator): a plane that moves no more than this is at rest
 LONGEST_ASCENT = 60.0  # s, for which a vehicle floats up with its plane at rest before it is at the surface
@@ -71,7 +71,8 @@ def _afloat(recording: Recording) -> NDArray[np.bool_]:
         return afloat
     shallow = np.diff(depth < LEFT, prepend=False, append=False)
     for first, end in np.flatnonzero(shallow).reshape(-1, 2):
-        if recording.intervals[first:end][depth[first:end] < AFLOAT].sum() >= LONG_ENOUGH:
+        lasting = recording.intervals[first:end]
+        if lasting[depth[first:end] < AFLOAT].sum() >= max(LONG_ENOUGH, MOSTLY * lasting.sum()):
             afloat[_ascent(recording, int(first)) : end] = True
     return afloat
 

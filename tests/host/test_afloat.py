@@ -73,11 +73,19 @@ def test_a_plane_always_at_rest_costs_a_minute_of_the_ascent_at_most() -> None:
     [
         legs((3.0, 60.0), (0.3, 8.0), (3.0, 100.0)),
         legs((0.8, 200.0), (2.0, 50.0)),
-        legs((0.1, 100.0), (-4.0, 60.0), (4.0, 100.0)),
+        legs((0.8, 100.0), (0.3, 30.0), (0.8, 100.0), (3.0, 100.0)),
+        legs((0.1, 100.0), (-0.7, 60.0), (4.0, 100.0)),
         np.full(1000, 0.1),
         np.full(1000, np.nan),
     ],
-    ids=["a short visit", "a shallow leg", "depth from elsewhere", "never under water", "no depth"],
+    ids=[
+        "a short visit",
+        "a shallow leg",
+        "waves above one",
+        "depth from elsewhere",
+        "never under water",
+        "no depth",
+    ],
 )
 def test_what_is_no_surface_stays(depth: Array) -> None:
     whole = recording(depth)
