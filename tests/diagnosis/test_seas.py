@@ -48,6 +48,7 @@ def in_waves(extra: Extra, carried: float, turned: float) -> Extra:
     return rough
 
 
+@pytest.mark.long
 def test_a_coupling_is_found_among_waves() -> None:
     coupled = in_waves(lambda time, x, plane: (0.8 * x[1], 0.0, 0.0), 0.01, 0.02)  # noqa: ARG005
     said: list[str] = []
