@@ -1,20 +1,20 @@
 """Where a recording is at the surface: a hull that is partly out of the water moves by other physics.
 
-Its buoyancy grows with its draught, its planes and propeller draw air, and it often lies without thrust. None
-of this is in the equations of a dive, so such stretches are left out, and told.
+Its buoyancy grows with its draught, its planes and propeller draw air, and it lies without thrust, its plane
+at rest. None of this is in the equations of a dive, so such stretches are left out, and told.
 """
 
 from dataclasses import replace
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from host.recording import Array, Recording
 
 AFLOAT, LEFT = 0.5, 1.0  # m: depth of a vehicle at the surface, and by which it has left it
 ABOVE = -0.5  # m: where depth is less than that, it is not counted from the surface
-LONG_ENOUGH, MOSTLY = 15.0, 0.5  # s at the surface, and share of what is above `LEFT`: no shallow leg is so
+LONG_ENOUGH, MOSTLY = 15.0, 0.5  # s at the surface with the plane at rest, and share of what is above `LEFT`
 SMOOTHED = 5.0  # s, of which the median depth counts: a wave or a spike is no dive
 STILL = 0.01  # rad (a unit of another actuator): a plane that moves no more than this is at rest
 LONGEST_ASCENT = 60.0  # s, for which a vehicle floats up with its plane at rest before it is at the surface
@@ -71,8 +71,10 @@ def _afloat(recording: Recording) -> NDArray[np.bool_]:
         return afloat
     shallow = np.diff(depth < LEFT, prepend=False, append=False)
     for first, end in np.flatnonzero(shallow).reshape(-1, 2):
-        lasting = recording.intervals[first:end]
-        if lasting[depth[first:end] < AFLOAT].sum() >= max(LONG_ENOUGH, MOSTLY * lasting.sum()):
+        lasting, rudder = recording.intervals[first:end], recording.rudder[first:end]
+        # Where the plane works, the vehicle is flown, and its depth may count from elsewhere.
+        lies = (depth[first:end] < AFLOAT) & (np.abs(rudder - np.median(rudder)) <= STILL)
+        if lasting[lies].sum() >= max(LONG_ENOUGH, MOSTLY * lasting.sum()):
             afloat[_ascent(recording, int(first)) : end] = True
     return afloat
 
@@ -90,6 +92,5 @@ def _smoothed(recording: Recording) -> Array:
     if not known.any():
         return np.empty(0)
     depth = np.interp(recording.time, recording.time[known], recording.depth[known])
-    reach = int(0.5 * SMOOTHED / recording.step)
-    windows = sliding_window_view(np.pad(depth, reach, mode="edge"), 2 * reach + 1)
-    return np.asarray(np.median(windows, axis=1))
+    rows = 2 * int(0.5 * SMOOTHED / recording.step) + 1
+    return np.asarray(median_filter(depth, rows, mode="nearest"))

@@ -31,7 +31,7 @@ from host.diagnosis.workers import Workers
 from host.waves import MOST_STEPS, is_sea, mean_moment
 
 MOSTLY = 0.7  # of what waves explain: of true ones a linear hull explains at most 0.4, of false ones 0.9
-PARTLY = 0.2  # of what waves gain over white forces: of true ones at most 0.02, of false ones 0.3 and more
+PARTLY = 0.2  # of what waves gain over white forces: of false ones 0.3 and more, of plain ones at most 0.02
 NARROW = 0.26  # band of a fully developed sea; of true ones 0.03 to 0.17 was found beside a linear hull
 SOME_STEPS = 8
 MEAN_MOMENTS = 2.0  # of what it may be: four seas came to 1.0 to 1.3
@@ -155,23 +155,24 @@ def plain_waves(fitter: Fitter) -> Explanation | None:
     if fitter.excess(root.fit) < LITTLE:
         return None
     sea, calm = with_sea(fitter, root), as_filtered(fitter, root).bic
-    hull, waves, least = _linear_in(fitter, sea), None, min(sea.bic, calm)
+    least, gain = min(sea.bic, calm), NAMING_MARGIN
     if roughly_with_waves(fitter, sea).bic < least - NAMING_MARGIN:
         waves = with_waves(fitter, sea)
-        if is_sea(waves.fit) and not _follow_the_plane(fitter, sea, hull, waves):
+        if is_sea(waves.fit) and not _follow_the_plane(fitter, sea, waves):
             return waves
+        gain = least - waves.bic
     if sea.bic > calm - NAMING_MARGIN or _does_a_linear_hull(fitter, calm - sea.bic):
         return None
-    beside = _beside_hull(fitter, hull, NAMING_MARGIN if waves is None else least - waves.bic)
+    beside = _beside_hull(fitter, _linear_in(fitter, sea), gain)
     return None if beside is None else with_waves(fitter, sea, beside.fit)
 
 
-def _follow_the_plane(fitter: Fitter, sea: Explanation, hull: Explanation, waves: Explanation) -> bool:
+def _follow_the_plane(fitter: Fitter, sea: Explanation, waves: Explanation) -> bool:
     """Whether what passes for waves is mostly what the plane does to any hull, or in part to one in a sea.
 
     Of a hull that is unstable only a filter tells that: no free run follows its linear part alone.
     """
-    if sea.bic - hull.bic > PARTLY * (sea.bic - waves.bic):
+    if sea.bic - _linear_in(fitter, sea).bic > PARTLY * (sea.bic - waves.bic):
         return True
     return _does_a_linear_hull(fitter, as_filtered(fitter, fitter.root).bic - waves.bic)
 

@@ -117,12 +117,11 @@ def test_what_only_passes_for_waves_is_none(monkeypatch: pytest.MonkeyPatch) -> 
 def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> None:
     fitter = Fitter([hidden_dive(lambda _, x, __: (0.0, 2.0 * x[0], 0.0), duration=60.0)])
     sea = with_sea(fitter, fitter.root)
-    hull = _linear_in(fitter, sea)
     gain = fitter.root.bic - fitter.linear.bic
     assert gain > 1000.0
 
     def follow(bic: float) -> bool:
-        return _follow_the_plane(fitter, sea, hull, replace(sea, bic=bic))
+        return _follow_the_plane(fitter, sea, replace(sea, bic=bic))
 
     monkeypatch.setattr("host.diagnosis.seas.PARTLY", np.inf)
     assert follow(fitter.linear.bic)
@@ -137,7 +136,7 @@ def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> Non
     assert waves is not None
     sea = with_sea(rough, rough.root)
     hull = _linear_in(rough, sea)
-    assert not _follow_the_plane(rough, sea, hull, waves)
+    assert not _follow_the_plane(rough, sea, waves)
     monkeypatch.setattr("host.diagnosis.seas._follow_the_plane", lambda *_: True)
     gain = hull.bic - with_waves(rough, hull).bic
     assert gain > 100.0

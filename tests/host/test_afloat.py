@@ -12,6 +12,12 @@ from host.recording import Array, Recording
 from host.vehicle import default_vehicle, read_vehicle
 
 STEP = 0.2  # s
+
+
+def flown(rows: int) -> Array:
+    return 0.1 * np.sin(0.3 * np.arange(rows))
+
+
 DATA = Path(__file__).parent.parent / "data"
 EXAMPLES = Path(__file__).parents[2] / "tools" / "examples"
 
@@ -24,7 +30,7 @@ def recording(depth: Array, rudder: Array | None = None, start: float = 0.0, nam
         time=start + STEP * np.arange(depth.size),
         depth=depth + 0.02 * np.random.default_rng(0).standard_normal(depth.size),
         pitch=0.1 * np.sin(np.arange(depth.size)),
-        rudder=0.1 * np.sin(0.3 * np.arange(depth.size)) if rudder is None else rudder,
+        rudder=flown(depth.size) * (depth > 0.6) if rudder is None else rudder,
         speed=nothing,
         pitch_rate=nothing,
         step=STEP,
@@ -91,6 +97,14 @@ def test_what_is_no_surface_stays(depth: Array) -> None:
     whole = recording(depth)
     (same,) = under_water([whole])
     assert same is whole
+
+
+def test_a_plane_that_works_at_depth_zero_is_no_surface() -> None:
+    """As in simulations that begin there."""
+    depth = legs((0.1, 60.0), (4.0, 120.0))
+    whole = recording(depth, flown(depth.size))
+    assert under_water([whole]) == [whole]
+    assert len(under_water([recording(depth)])[0].time) < depth.size
 
 
 def test_spikes_and_losses_at_the_surface_are_no_dive() -> None:

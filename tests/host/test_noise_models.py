@@ -18,7 +18,7 @@ from host.maximum_likelihood import fit_maximum_likelihood
 from host.propagate import free_run, inputs_of
 from host.uncertainty import covariance
 from host.vehicle import default_vehicle
-from host.waves import SHAPE, in_waves, in_waves_from, is_sea, whitened_in_waves
+from host.waves import SHAPE, in_waves, in_waves_from, is_sea, passes_in_waves, whitened_in_waves
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 
@@ -144,6 +144,13 @@ def test_waves_are_found_with_their_frequency_and_bias_nothing() -> None:
     white, sensitivity = whitened_in_waves(here, inputs)[0]
     np.testing.assert_allclose(white, np.nan_to_num(fit.whitened[0]), atol=1e-9)
     assert sensitivity.shape == (2, fit.parameters.size + 4, recording.time.size)
+    # So they are by its own gains, handed in; and by those of other waves they are not.
+    own, states = passes_in_waves(here, inputs), fit.structure.states
+    by_gains, slopes = whitened_in_waves(here, inputs, own, states)[0]
+    np.testing.assert_allclose(by_gains, white, atol=1e-9)
+    np.testing.assert_allclose(slopes, sensitivity, rtol=1e-6, atol=1e-6)
+    other = passes_in_waves(here.with_noise(here.noise * np.array([1, 1, 2, 1, 1, 1, 1])), inputs)
+    assert not np.allclose(whitened_in_waves(here, inputs, other, states)[0][0], white, atol=1e-3)
 
 
 def test_one_wave_in_depth_and_pitch_leaves_speed_and_damping_alone(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from host.errors import RecordingError
+from host.recording import Recording
 from tools.cli import main
 
 DATA = Path(__file__).parent.parent / "data"
@@ -16,7 +18,9 @@ def identify(out: Path, recording: Path, *options: str) -> tuple[int, dict[str, 
     return code, json.loads((out / "model.json").read_text())["parameters"]
 
 
-def test_a_glider_is_identified_and_its_battery_moment_called_open(tmp_path: Path) -> None:
+def test_a_glider_is_identified_and_its_battery_moment_called_open(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Its battery hardly moved in this dive: the pitch moment per metre must not be claimed.
 
     How badly it is known is itself badly known, and depends on the last bits of the arithmetic.
@@ -27,6 +31,19 @@ def test_a_glider_is_identified_and_its_battery_moment_called_open(tmp_path: Pat
     std = parameters["b2"]["std"]
     assert std is None or std > 0.2 * abs(parameters["b2"]["value"])
     assert parameters["u0"]["value"] == pytest.approx(0.3, abs=0.1)
+    # Where it called home is left out, by every command that learns or judges.
+    left_out = "at the surface, and left out: 726 to 1014 s"
+    assert left_out in capsys.readouterr().err
+    options = ["--vehicle", str(EXAMPLES / "slocum.toml")]
+    assert main(["predict", str(tmp_path / "model.json"), str(recording), *options]) == 0
+    assert left_out in capsys.readouterr().err
+
+    def diagnose(recordings: list[Recording], *_: object) -> None:
+        raise RecordingError(recordings[0].notes[-1])
+
+    monkeypatch.setattr("host.diagnosis.diagnose.diagnose", diagnose)
+    assert main(["diagnose", str(recording), *options, "--quiet"]) == 2
+    assert left_out in capsys.readouterr().err
 
 
 def test_an_independent_simulator_is_identified_and_physics_left_out_is_admitted(
