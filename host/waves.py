@@ -161,9 +161,13 @@ def in_waves_from(
 
 
 def is_sea(fit: Fit) -> bool:
-    """Whether a fit's waves have a period of surface waves, in a band no broader than a sea's."""
+    """Whether a fit's waves have a period of surface waves, in a band no broader than a sea's.
+
+    A fit that ran away has none: its frequency is 0.
+    """
     frequency, damping = fit.waves[:2]
-    return bool(WAVE_PERIODS[0] < 2.0 * np.pi / frequency < WAVE_PERIODS[1] and damping < BROADEST)
+    shortest, longest = WAVE_PERIODS
+    return bool(2.0 * np.pi / longest < frequency < 2.0 * np.pi / shortest and damping < BROADEST)
 
 
 def mean_moment(fit: Fit) -> float:

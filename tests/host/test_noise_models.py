@@ -135,7 +135,8 @@ def test_waves_are_found_with_their_frequency_and_bias_nothing() -> None:
     # A fit that goes on from there, in the same waves, finds nothing more, and its innovations are the same.
     inputs = [inputs_of(recording)]
     assert is_sea(fit)
-    for broad_or_slow in ([1.0, 0.4], [0.3, 0.1], [4.0, 0.1]):
+    ran_away = [0.0, 0.0]
+    for broad_or_slow in ([1.0, 0.4], [0.3, 0.1], [4.0, 0.1], ran_away):
         assert not is_sea(replace(fit, waves=np.array([*broad_or_slow, 0.0, 1.0, 1.0])))
     here = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
     again = in_waves_from(here, inputs, fit.free, holds_noise=True)
