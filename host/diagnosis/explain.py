@@ -67,7 +67,8 @@ def explain(
             return Explained(led[1], led[0], left_then, None)
     if plain is not None and plain.left.is_nothing and not left.is_nothing:
         return plain
-    if best.names or not left.is_nothing:
+    # Where no free run comes near, none tells a form of unknown physics from another.
+    if not search.is_pushed_about and (best.names or not left.is_nothing):
         grown = with_unknown(search, best)
         if grown is not best and not unknown_in(grown):
             grown = told_by_the_usual(search, grown)  # what joined late has not been asked yet

@@ -39,6 +39,7 @@ PROMISING = 6
 CONTENDERS = 3  # for the place of the leading set
 MOST_ROUNDS = 4
 LOST = 10.0  # times the noise floor: forces as slight as this leave no stable hull so far away
+FAR_LIKELIER = 2.0  # of BIC a sample: what no few effects more make up for
 
 Progress = Callable[[str], None]
 
@@ -87,7 +88,7 @@ class Search:
             self.on_progress("settling")
             settled = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
             return self._settled(min(settled, key=lambda e: e.bic))
-        foreign: Explanation | None = None
+        foreign, leading, enough = None, self.root, None
         for size in range(1, LARGEST_SET + 1):
             if size == 2 and self._needs_many(beam[0], size):
                 beam = self._with_best_pair(beam)
@@ -106,9 +107,11 @@ class Search:
                 break
             if not beam or beam[0].bic > best_before - margin(beam[0]):
                 break
-            if size == 1 and self._may_be_foreign(beam[0]):
-                foreign = lone_form(self, beam[0])
-                if foreign is not None and self._is_only_flexible(foreign, beam[0]):
+            if size == 1:
+                leading, enough = beam[0], self._most_without_form(beam[0])
+            if size == enough:
+                foreign = lone_form(self, leading)
+                if foreign is not None and self._is_only_flexible(foreign, leading):
                     break
         if self.is_led_elsewhere:
             return min((e for e in self.tried.values() if FREE_TRIM.name not in e.names), key=lambda e: e.bic)
@@ -261,9 +264,14 @@ class Search:
         best = min(pairs, key=lambda e: e.bic, default=first)
         return [best, *singles] if self.fitter.excess(best.fit) < MUCH else singles
 
-    def _may_be_foreign(self, leading: Explanation) -> bool:
-        """Whether one effect leaves so much that a form of unknown physics is worth a look already."""
-        return not self.root.fit.has_process_noise and self.fitter.excess(leading.fit) > LITTLE
+    def _most_without_form(self, leading: Explanation) -> int | None:
+        """So many effects need no look at forms of unknown physics, more do; None among forces.
+
+        Of one that leaves much, one form may do the work at once.
+        """
+        if self.root.fit.has_process_noise:
+            return None
+        return 1 if self.fitter.excess(leading.fit) > LITTLE else SMALL
 
     def _is_only_flexible(self, foreign: Explanation, leading: Explanation) -> bool:
         """Whether what wanders with time only stands for what every vehicle has, which moves as slowly."""
@@ -340,15 +348,29 @@ class Search:
     @property
     def follows_no_free_run(self) -> bool:
         """Whether slight forces let the equations follow a vehicle that they lose without: it is unstable."""
-        if self.steered is None or not self.joint:
+        return self.steered is not None and self._is_lost and self.fitter.are_slight(self.steered.fit.noise)
+
+    @property
+    def is_pushed_about(self) -> bool:
+        """Whether no free run comes near the vehicle, where the equations follow it under random forces.
+
+        It may be unstable as well; turns push it, or what is not in the equations at all.
+        """
+        if self.steered is None or not self._is_lost:
             return False
-        left = min(self.fitter.excess(self.tried[names].fit) for names in self.joint)
-        return bool(left > LOST and self.fitter.are_slight(self.steered.fit.noise))
+        least = min(one.bic for one in self.tried.values())
+        return self.steered.bic < least - FAR_LIKELIER * self.steered.fit.samples
+
+    @property
+    def _is_lost(self) -> bool:
+        """Whether all that every vehicle has, and what promised most beside it, leaves very much."""
+        left = (self.fitter.excess(self.tried[names].fit) for names in self.joint)
+        return min(left, default=0.0) > LOST
 
     @property
     def is_led_elsewhere(self) -> bool:
         """Whether no free run under white noise alone will tell."""
-        return self.follows_no_free_run or self.adrift is not None
+        return self.follows_no_free_run or self.is_pushed_about or self.adrift is not None
 
     def is_hopeless(self, best: Explanation) -> bool:
         """Whether much is left although all that every vehicle has was tried at once."""

@@ -98,3 +98,18 @@ def test_what_a_few_explain_needs_no_dozen(is_for_few: bool) -> None:
         fitter_that_leaves(3.0), cast("Any", None), lambda _: None, one, one, is_for_few=is_for_few
     )
     assert search._needs_many(one, 2) is not is_for_few
+
+
+@pytest.mark.parametrize("is_pushed", [False, True])
+def test_no_form_of_unknown_physics_is_asked_where_no_free_run_comes_near(
+    is_pushed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+    monkeypatch.setattr(Search, "is_pushed_about", is_pushed)
+    monkeypatch.setattr(module, "with_unknown", lambda _, best: asked.append(best) or best)
+    monkeypatch.setattr(module, "in_a_sea", lambda search, _: (search, RARE_SET))
+    monkeypatch.setattr(module, "among_waves", lambda search, best, _: (search, best, None))
+    monkeypatch.setattr(module, "among_drift", lambda *_: None)
+    answer, _ = explained(monkeypatch, ORDINARY_SET, left=MUCH_LEFT)
+    assert answer.best is RARE_SET
+    assert asked == ([] if is_pushed else [ORDINARY_SET])

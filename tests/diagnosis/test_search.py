@@ -231,3 +231,37 @@ def test_two_that_explain_much_each_are_asked_before_a_dozen(
     assert grown == names[1:]
     assert leading[-3:] == singles
     assert ({"internal_wave", "actuator_rate_limit"} <= leading[0].names) is is_kept
+
+
+@pytest.mark.parametrize(("left", "asked_after"), [(LITTLE + 0.1, 1), (LITTLE - 0.1, 3), (None, None)])
+def test_one_form_competes_with_one_effect_that_leaves_much_or_three(
+    left: float | None, asked_after: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitter = Fitter([hidden_dive(duration=20.0)])
+    root = fitter.root
+    if left is None:  # among forces nobody asks
+        root = replace(root, fit=replace(root.fit, noise=np.array([*fitter.floor, 1e-6, 1e-6])))
+    names = ["munk_moment", "actuator_lag", "actuator_backlash", "rudder_stall"]
+    sizes: list[int] = []
+
+    def grown(search: Search, _: list[Explanation], size: int) -> list[Explanation]:
+        sizes.append(size)
+        larger = replace(root, names=root.names | {*names[:size]}, bic=root.bic - 50.0 * size)
+        return [search.remember(larger)]
+
+    def lone_form(_: Search, leading: Explanation) -> Explanation:
+        assert leading.names == root.names | {names[0]}
+        asked.append(len(sizes))
+        return replace(root, names=root.names | {"unknown_moment_q_q"}, bic=root.bic - 1000.0)
+
+    asked: list[int] = []
+    monkeypatch.setattr(Search, "_grown", grown)
+    monkeypatch.setattr(Search, "_needs_many", lambda *_: False)
+    monkeypatch.setattr(Search, "_concluded", lambda search: min(search.tried.values(), key=lambda e: e.bic))
+    monkeypatch.setattr(Fitter, "excess", lambda *_: left or 2.0)
+    monkeypatch.setattr("host.diagnosis.search.with_offset", lambda _, sets: sets)
+    monkeypatch.setattr("host.diagnosis.search.lone_form", lone_form)
+    with Workers(fitter, 1) as workers:
+        found = Search(fitter, workers, lambda _: None, fitter.base, root).run()
+    assert asked == ([] if asked_after is None else [asked_after])
+    assert found.names - root.names == ({*names} if asked_after is None else {"unknown_moment_q_q"})

@@ -10,7 +10,7 @@ from host.catalogue import structure_of
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import SLIGHT, Fitter
 from host.diagnosis.leftover import leftover
-from host.diagnosis.search import LOST, Search
+from host.diagnosis.search import FAR_LIKELIER, LOST, Search
 from host.diagnosis.seas import Explained, again_astray, led_astray
 from host.diagnosis.speed_forces import densities
 from host.diagnosis.workers import Workers
@@ -91,3 +91,25 @@ def test_slight_forces_beside_a_free_run_that_is_lost(share: float, excess: floa
         lost = np.array([*(excess * LOST * fitter.floor), 0.0, 0.0])
         search.joint.add(search.remember(replace(best, fit=replace(best.fit, noise=lost))).names)
         assert search.follows_no_free_run == is_unstable
+
+
+@pytest.mark.parametrize(
+    ("likelier", "excess", "is_pushed"), [(2.0, 2.0, True), (0.5, 2.0, False), (2.0, 0.5, False)]
+)
+def test_forces_that_are_not_slight_beside_a_free_run_that_is_lost(
+    likelier: float, excess: float, is_pushed: bool
+) -> None:
+    fitter, best = flown(0.0)
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        assert not search.is_pushed_about
+        lost = np.array([*(excess * LOST * fitter.floor), 0.0, 0.0])
+        search.joint.add(search.remember(replace(best, fit=replace(best.fit, noise=lost))).names)
+        assert not search.is_pushed_about
+        forces = 2.0 * SLIGHT * np.square(fitter.accelerations)
+        search.steered = replace(
+            best,
+            fit=replace(best.fit, noise=np.array([*fitter.floor, *forces])),
+            bic=best.bic - likelier * FAR_LIKELIER * best.fit.samples,
+        )
+        assert search.is_pushed_about == search.is_led_elsewhere == is_pushed
