@@ -102,6 +102,8 @@ def _separation(found: Diagnosis, name: str, twin: str, rival: Explanation) -> S
         long = _long_enough(found, flight, named, rival)
         if long is None:
             break
+        if not np.isfinite(long.predicted):
+            continue  # repeated, it turns the vehicle over
         predicted, rows = long.predicted, long.manoeuvre.rudder.size
         confirmed = long.confirmed() if rows <= MOST_CONFIRMED else float("nan")
         told = replace(base, manoeuvre=long.manoeuvre, predicted=predicted, confirmed=confirmed)

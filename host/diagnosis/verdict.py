@@ -19,6 +19,7 @@ from host.diagnosis.leftover import SEA_DOUBT, Leftover
 from host.diagnosis.minute import minute_in
 from host.diagnosis.scoring import Misfit
 from host.diagnosis.unknown_physics import known_in, unknown_in
+from host.equations import NAMES, PARAMETERS
 from host.recording import Array
 from host.uncertainty import safe_inverse
 
@@ -87,7 +88,7 @@ def cancelling_in(explanation: Explanation) -> list[str]:
 
 
 def beyond_bounds_in(explanation: Explanation) -> list[str]:
-    """The effects with a size that ends at the largest value its bounds allow, and is known there.
+    """The effects with a size at the largest value its bounds allow, and known there; and the forward speed.
 
     It would be larger still if it could: what no vehicle has does the work of something else. Not asked of
     a share: the whole is natural, and in more than that another detail of the same geometry shows.
@@ -95,15 +96,17 @@ def beyond_bounds_in(explanation: Explanation) -> list[str]:
     fit = explanation.fit
     names = fit.structure.names
     std = np.sqrt(np.diag(safe_inverse(fit.information)))  # a lean fit does not know how coloured it is
+    effects = map(BY_NAME.__getitem__, known_in(explanation))
+    sizes = [(effect.name, p) for effect in effects for p in effect.parameters if p.name in effect.size_names]
+    sizes.append(("forward_speed", PARAMETERS[NAMES.index("u0")]))
     found: list[str] = []
-    for effect in map(BY_NAME.__getitem__, known_in(explanation)):
-        for parameter in effect.parameters:
-            is_share = parameter.unit == "1" and parameter.lower >= 0.0 and parameter.upper <= LARGEST_SHARE
-            if parameter.name not in effect.size_names or parameter.name not in names or is_share:
-                continue
-            k, largest = names.index(parameter.name), max(abs(parameter.lower), abs(parameter.upper))
-            if fit.free[k] and abs(fit.parameters[k]) > NEARLY * largest and std[k] < KNOWN * largest:
-                found.append(effect.name)
+    for owner, parameter in sizes:
+        is_share = parameter.unit == "1" and parameter.lower >= 0.0 and parameter.upper <= LARGEST_SHARE
+        if parameter.name not in names or is_share:
+            continue
+        k, largest = names.index(parameter.name), max(abs(parameter.lower), abs(parameter.upper))
+        if fit.free[k] and abs(fit.parameters[k]) > NEARLY * largest and std[k] < KNOWN * largest:
+            found.append(owner)
     return sorted({*found})
 
 

@@ -108,28 +108,36 @@ def test_offsets_that_cancel_are_doubted_by_name(
 
 
 @pytest.mark.parametrize(
-    ("c_ud", "std", "is_doubted"), [(500.0, 100.0, True), (500.0, 400.0, False), (400.0, 100.0, False)]
+    ("own", "value", "std", "doubted"),
+    [
+        ("c_ud", 500.0, 100.0, "speed loss"),
+        ("c_ud", 500.0, 400.0, ""),
+        ("c_ud", 400.0, 100.0, ""),
+        ("u0", 20.0, 0.1, "forward speed"),
+        ("u0", 20.0, 15.0, ""),
+        ("u0", 19.0, 0.1, ""),
+    ],
 )
 def test_a_coefficient_that_would_be_larger_than_on_any_vehicle_is_doubted(
-    base: Explanation, c_ud: float, std: float, is_doubted: bool
+    base: Explanation, own: str, value: float, std: float, doubted: str
 ) -> None:
     structure = structure_of(frozenset({"speed_loss"}))
     fit, count = base.lean().fit, len(structure.names)
-    known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True)) | {"c_ud": c_ud}
+    known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True)) | {own: value}
     values = np.array([known.get(name, 1.0) for name in structure.names])
     free = np.ones(count, dtype=bool)
     information = np.eye(count)
-    information[structure.names.index("c_ud"), structure.names.index("c_ud")] = std**-2
+    information[structure.names.index(own), structure.names.index(own)] = std**-2
     white = [np.random.default_rng(0).normal(size=row.shape) for row in fit.whitened]
     found = replace(
         fit, structure=structure, parameters=values, free=free, information=information, whitened=white
     )
     best = Explanation(frozenset({"speed_loss"}), found, base.bic)
-    assert beyond_bounds_in(best) == ["speed_loss"] * is_doubted
-    verdict: Verdict = "partly_explained" if is_doubted else "explained"
+    assert beyond_bounds_in(best) == [doubted.replace(" ", "_")] * bool(doubted)
+    verdict: Verdict = "partly_explained" if doubted else "explained"
     assert verdict_on(best, leftover(), misfit(5.0), misfit(1.0)) == verdict
     said = remaining(verdict, best, leftover(), misfit(1.0))
-    assert ("speed loss would have to be larger than on any vehicle" in said) == is_doubted
+    assert (f"{doubted} would have to be larger than on any vehicle" in said) == bool(doubted)
 
 
 @pytest.mark.parametrize(("evidence", "verdict"), [(16.0, "partly_explained"), (200.0, "explained")])

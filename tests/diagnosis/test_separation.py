@@ -7,6 +7,7 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.diagnosis.diagnose import Diagnosis
+from host.diagnosis.explanation import Explanation
 from host.diagnosis.manoeuvres import LONGEST, SHORTEST, library
 from host.diagnosis.separation import SEPARATES, _Flight, separations
 
@@ -72,6 +73,24 @@ def test_a_manoeuvre_that_fails_in_simulation_is_not_recommended(
     assert len(flown) == len(set(flown)) == 2
     assert f"{flown[-1]} promises to" in found.sentence
     assert "gave -50 of BIC" in found.sentence
+
+
+def test_a_manoeuvre_that_turns_the_vehicle_over_once_repeated_is_not_recommended(
+    coupled: Diagnosis, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+
+    def repeated(_: Diagnosis, flight: _Flight, *__: Explanation) -> _Flight:
+        asked.append(flight.predicted)
+        if len(asked) == 1:
+            flight.predicted = float("nan")
+        return flight
+
+    monkeypatch.setattr("host.diagnosis.separation._long_enough", repeated)
+    (found,) = separations(with_twin(coupled, "depth_sensor_lag"))
+    assert len(asked) == 2
+    assert found.predicted == asked[1]
+    assert "nan" not in found.sentence
 
 
 def test_an_event_of_the_recording_cannot_be_flown_again(coupled: Diagnosis) -> None:
