@@ -151,7 +151,9 @@ def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfi
         return "What is left is as small as the sensors' own noise."
     if forms and left.is_nothing:
         return f"Physics is at work that the catalogue does not hold.{forms}" + sea
-    if left.is_nothing and (after.chi2 < WORSE or waves < inf) and (doubt := _doubt(best, waves)):
+    # Among random forces a free run is astray whatever is known, so that tells nothing.
+    is_near = after.chi2 < WORSE or waves < inf or best.fit.has_process_noise
+    if left.is_nothing and is_near and (doubt := _doubt(best, waves)):
         return f"Nothing else is left, but {doubt}" + sea
     if left.is_smooth:
         kind = "it depends on the motion, so it is physics and no sea, but none that is known here"

@@ -138,6 +138,10 @@ def test_a_coefficient_that_would_be_larger_than_on_any_vehicle_is_doubted(
     assert verdict_on(best, leftover(), misfit(5.0), misfit(1.0)) == verdict
     said = remaining(verdict, best, leftover(), misfit(1.0))
     assert (f"{doubted} would have to be larger than on any vehicle" in said) == bool(doubted)
+    noise = np.array([*fit.noise[:2], 1e-6, 1e-6])  # of random forces, which lead a free run away
+    rough = replace(best, fit=replace(found, noise=noise))
+    said = remaining(verdict, rough, leftover(), misfit(40.0))
+    assert (f"{doubted} would have to be larger than on any vehicle" in said) == bool(doubted)
 
 
 @pytest.mark.parametrize(("evidence", "verdict"), [(16.0, "partly_explained"), (200.0, "explained")])
