@@ -21,7 +21,12 @@ def ballast(c: Chain) -> ca.SX:
     return c.p["c_wb"] * after(c, c.p["ballast_time"])
 
 
-_PARTS = {"c_w0": constant, "c_wz": compressed, "c_wb": ballast}
+def trimmed(c: Chain) -> ca.SX:
+    """Of an imperfect trim whose cause is not known yet: of no other is it as often."""
+    return c.p["trim_heave"]
+
+
+_PARTS = {"c_w0": constant, "c_wz": compressed, "c_wb": ballast, "trim_heave": trimmed}
 
 
 def net_weight(c: Chain) -> ca.SX:

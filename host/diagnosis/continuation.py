@@ -10,6 +10,7 @@ rest before it seems to be lacking, so the first stage is asked at once; and two
 seems to be lacking later may be the other one.
 """
 
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,39 +39,47 @@ SAME_END, SAME_SPEED = 3.0, 0.05  # of BIC, and of the speed, between two fits o
 CLEARLY = 50.0  # of BIC, that each must gain by then and at the end, where nothing seems to be lacking
 PROMISING, MOST_PROMISING = 2, 3  # effects that are tried where one may join, and at the first stage
 PLACES = 2  # in which each of them begins
+FAIR_PART = 0.3  # of what its last stages lost, that an effect must gain to join
 FAR_MORE = 3.0  # times what was left when no effect helped: fewer forces make up for less
 SLIGHTLY = 1.05  # times the variance expected: enough for another look at the moments
 FEW_STEPS, STEPS = 10, 40  # of the parameters at one stage: many lie along a ridge, where a stage is slow
 SPEED = NAMES.index("u0")
-APPARENT = ("pitch_bias", "vertical_current")  # no constant force does the same where heave is not linear
+APPARENT = ("pitch_bias", "vertical_current")
+"""What no free trim does where heave is not linear, nor shows at one step from a set bent without them."""
 LOST = 2.0  # of BIC a sample, to the best stage: the last ones lead nowhere
 BEHIND = 0.1  # of BIC a sample, to the best of the same stage: it leads nowhere
 
 
 def continued(search: "Search", names: Names, most_beside: int) -> Explanation | None:
-    """The set, with drag along the hull or not, and at most so many effects more.
+    """The set beside a bias and a current, with drag along the hull or not, and at most so many effects more.
 
     None where the filter loses the recording.
     """
+    names |= {*APPARENT}
     fitter, common = search.fitter, names | {ALONG_THE_HULL}
     followed = _with_what_is_large(search, names)
     swapped = [at for one in followed for at in with_poles_swapped(_at(one))]
-    most = LITTLE  # that may be left without another look at what is lacking
+    most, most_lost = LITTLE, NAMING_MARGIN  # without another look at what is lacking
+    least = inf  # BIC so far: the true physics gets likelier with every stage
     for share in STAGES[UNDECIDED:]:
         others = _steered(search, [_forced(fitter, at, share) for at in swapped])
         others = _under(search, [one for one in others if _is_near(one, followed[0], BEHIND)], share, STEPS)
         followed = _distinct([*_under(search, followed, share, STEPS), *others])[:FOLLOWED]
         followed = [one for one in followed if _is_near(one, followed[0], BEHIND)]
         followed, swapped = _moved(search, followed), []
-        while followed and _left(followed[0]) > most and len(followed[0].names - common) < most_beside:
-            larger = _best_of_each(_larger(search, followed[0], PROMISING))[:1]
-            if not larger or larger[0].bic > followed[0].bic - NAMING_MARGIN:
-                most = FAR_MORE * _left(followed[0])
+        while followed and len(followed[0].names - common) < most_beside:
+            left, lost = _left(followed[0]), followed[0].bic - least
+            if left < most and lost < most_lost:
                 break
-            most = LITTLE
+            larger = _best_of_each(_larger(search, followed[0], PROMISING))[:1]
+            if not larger or larger[0].bic > followed[0].bic - max(NAMING_MARGIN, FAIR_PART * lost):
+                most, most_lost = FAR_MORE * left, max(most_lost, FAR_MORE * lost)
+                break
+            most, most_lost = LITTLE, NAMING_MARGIN
             followed = [*_moved(search, larger), *followed][:FOLLOWED]
         if not followed:
             return None
+        least = min(least, followed[0].bic)
         likeliest = _kept(search, followed)
         if not _is_near(followed[0], likeliest, LOST):
             break
@@ -166,7 +175,7 @@ def _is_near(one: Explanation, best: Explanation, most: float) -> bool:
 def _larger(search: "Search", parent: Explanation, most: int) -> list[Explanation]:
     """The set with one effect more, of those that promise most under these forces."""
     # What a free run made of an effect alone is no start here, so each is foretold from its own probes.
-    names = [*search.candidates(parent), *(name for name in APPARENT if name not in parent.names)]
+    names = search.candidates(parent)
     ahead = search.workers.results([(gain, (parent, name, [], True)) for name in names])
     gains = dict(zip(names, ahead, strict=True))
     names = sorted(gains, key=lambda name: -gains[name])[:most]

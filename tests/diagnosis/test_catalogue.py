@@ -351,13 +351,14 @@ def test_the_drive_of_the_plane_is_exact_however_coarse_the_rows(names: tuple[st
     assert np.abs(run - true).max() < 1e-3 * np.ptp(true, axis=1).min()
 
 
-def test_a_net_weight_drives_a_pitched_hull_along_its_axis() -> None:
+@pytest.mark.parametrize(("name", "size"), [("net_buoyancy", "c_w0"), ("free_trim", "trim_heave")])
+def test_a_net_weight_drives_a_pitched_hull_along_its_axis(name: str, size: str) -> None:
     # Where the speed has settled: 0 = -(u^2 - u0^2)/(2 u0 speed_time) - c_uq c_w0 sin theta.
     still = hidden_dive(duration=60.0)
     climb = replace(still, rudder=np.full(still.time.size, -0.2), speed=np.full(still.time.size, np.nan))
-    structure = structure_of(("speed_loss", "net_buoyancy"))
+    structure = structure_of(("speed_loss", name))
     known = dict.fromkeys(structure.names, 0.0) | BASE
-    known |= {"speed_time": 3.0, "c_uq": 1.9, "c_w0": 0.05}
+    known |= {"speed_time": 3.0, "c_uq": 1.9, size: 0.05}
     run = free_run(np.array([known[name] for name in structure.names]), START, inputs_of(climb, structure))
     theta, lost = run.outputs[0, -1], run.states[structure.states.index("speed_loss"), -1]
     u0 = BASE["u0"]

@@ -20,6 +20,7 @@ from host.gauss_newton import Point
 from host.recording import Recording
 
 NAMES = frozenset({*ORDINARY, FREE_TRIM.name})
+BEGUN = NAMES | {"pitch_bias", "vertical_current"}
 WEAKENED_AT, WEAKENED_BY = 70.0, 0.4
 HALF_LENGTH = 0.8  # m
 Hull = dict[str, float]
@@ -124,7 +125,7 @@ def test_where_nothing_else_acts_nothing_joins() -> None:
     with Workers(fitter, 1) as workers:
         found = continued(search_of(workers, fitter), NAMES, most_beside=3)
     assert found is not None
-    assert found.names == NAMES
+    assert found.names == BEGUN
     assert fitter.excess(fitter.polished(found).fit) < 1.15
 
 
@@ -135,7 +136,7 @@ def test_a_long_hull_that_meets_the_water_differently_at_either_end(rows: int) -
     with Workers(fitter, 1) as workers:
         found = continued(search_of(workers, fitter), NAMES, most_beside=3)
     assert found is not None
-    assert found.names == NAMES | {"drag_along_the_hull"}
+    assert found.names == BEGUN | {"drag_along_the_hull"}
     found = fitter.polished(found)
     values = dict(zip(found.fit.structure.names, found.fit.parameters, strict=True))
     assert fitter.excess(found.fit) < 1.15
@@ -191,6 +192,32 @@ def test_a_current_joins_beside_the_free_trim_that_cannot_do_its_work() -> None:
     assert found is not None
     assert found.names & {"vertical_current", "pitch_bias"}
     assert fitter.excess(fitter.polished(found).fit) < 1.15
+
+
+def test_what_is_lacking_is_asked_where_fewer_forces_are_less_likely(monkeypatch: pytest.MonkeyPatch) -> None:
+    fitter = Fitter([dive(LONG, rows=300)])
+    least, slightly, by_far = 0.0, 15.0, 50.0  # of BIC, the latter two above the least
+    bic = iter([*np.linspace(90.0, least, 7), slightly, slightly, by_far, by_far, by_far])
+    now: list[float] = []
+    asked: list[float] = []
+
+    def under(search: Search, followed: list[Explanation], *_: object) -> list[Explanation]:  # noqa: ARG001
+        if not followed:
+            return []
+        now.append(next(bic))
+        return [replace(followed[0], bic=now[-1])]
+
+    def larger(*_: object) -> list[Explanation]:
+        asked.append(now[-1])
+        return []
+
+    stubs = {"_with_what_is_large": lambda *_: [fitter.root], "_under": under, "_larger": larger}
+    stubs |= {"_left": lambda _: 1.0, "_moved": lambda _, one: one, "with_poles_swapped": lambda _: []}
+    for name, stub in stubs.items():
+        monkeypatch.setattr(module, name, stub)
+    with Workers(fitter, 1) as workers:
+        continued(search_of(workers, fitter), fitter.root.names, most_beside=3)
+    assert asked == [slightly, by_far]
 
 
 def test_a_recording_that_the_filter_loses_has_no_continuation(monkeypatch: pytest.MonkeyPatch) -> None:
