@@ -37,6 +37,7 @@ from host.recording import Array, Recording
 
 HORIZON = 5.0  # s
 MOST_WORTH = 1e9  # of BIC: without some effects the equations run away
+Ranking = list[tuple[str, float]]
 SLOTS: tuple[Slot, ...] = ("heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment")
 
 
@@ -73,7 +74,7 @@ class Diagnosis:
     slots: dict[Slot, float]
     location: Location
     force: UnknownForce
-    ranking: list[tuple[str, float]]
+    ranking: Ranking
     remaining: str
     has_sea: bool
     bic: float
@@ -110,13 +111,21 @@ def diagnose(
     on_progress("base model")
     seen = as_sensed(without_outliers(with_plane_told(recordings)))
     first, *others = by_single_effects(ways(seen), on_progress, jobs)
-    return _diagnosed(first, others, on_progress, jobs, like)
+    return _diagnosed(first, others, on_progress, jobs, like, [])
 
 
 def _diagnosed(
-    way: Way, others: list[Way], on_progress: Callable[[str], None], jobs: int, like: Explanation | None
+    way: Way,
+    others: list[Way],
+    on_progress: Callable[[str], None],
+    jobs: int,
+    like: Explanation | None,
+    ranking: Ranking,
 ) -> Diagnosis:
-    """The diagnosis with the plane taken so, unless what is found speaks for another way."""
+    """The diagnosis with the plane taken so, unless what is found speaks for another way.
+
+    Then what was found so is begun with, and `ranking` is known from it.
+    """
     recordings, fitter = way.recordings, way.fitter
     floor, spans = noise_floor(recordings), divide(recordings)
     is_part = excerpt(spans.teaching) is not spans.teaching
@@ -129,7 +138,7 @@ def _diagnosed(
             judged = _judge(explained, spans, floor, on_progress)
     if again is not None:
         on_progress("the plane between rows")
-        return _diagnosed(again, [], on_progress, jobs, like)
+        return _diagnosed(again, [], on_progress, jobs, explained.best, _ranking(explained.search))
     if is_part:
         on_progress("the whole")
         fitter = Fitter(spans.teaching)
@@ -171,7 +180,7 @@ def _diagnosed(
         slots=judged.slots,
         location=locate(longest, errors, floor, values["u0"]),
         force=unknown_force(longest, {n: values[n] for n in NAMES}, floor, fitter.accelerations),
-        ranking=_ranking(search),
+        ranking=max(_ranking(search), ranking, key=len),
         remaining=" ".join([told, *_unnamed(best, waves), *_other_answers(found)]),
         has_sea=best.fit.has_process_noise,
         bic=best.bic,
@@ -262,7 +271,7 @@ def _slots(
     return {slot: share / total for slot, share in shares.items()} if total > 0.0 else shares
 
 
-def _ranking(search: Search) -> list[tuple[str, float]]:
+def _ranking(search: Search) -> Ranking:
     """What each effect alone improves the information criterion by, best first."""
     alone = [(effect.name, search.gain_alone(effect.name)) for effect in search.fitter.candidates]
     return sorted((pair for pair in alone if pair[1] > -inf), key=lambda pair: -pair[1])

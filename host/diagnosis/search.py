@@ -87,7 +87,8 @@ class Search:
         if self.part is not None or any(len(e.names) > LARGEST_SET for e in also or []):
             self.on_progress("settling")
             settled = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
-            return self._settled(min(settled, key=lambda e: e.bic))
+            found = self._settled(min(settled, key=lambda e: e.bic))
+            return found if self.part is not None else told_by_the_usual(self, whole(self, found))
         foreign, leading, enough = None, self.root, None
         for size in range(1, LARGEST_SET + 1):
             if size == 2 and self._needs_many(beam[0], size):

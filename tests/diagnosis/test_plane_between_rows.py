@@ -3,7 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -11,11 +11,14 @@ from hidden_dive import BASE, hidden_dive
 from scipy.integrate import solve_ivp
 
 from host.diagnosis.diagnose import diagnose
+from host.diagnosis.explain import explain
+from host.diagnosis.explanation import Explanation
 from host.diagnosis.files import write_extended_model
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.plane_choice import _is_whole_likelier, by_single_effects, is_likelier, ways
 from host.diagnosis.sea_fits import with_waves
 from host.diagnosis.search import Search
+from host.diagnosis.seas import Explained
 from host.diagnosis.workers import Workers
 from host.equations import NAMES
 from host.errors import RecordingError
@@ -218,6 +221,18 @@ def test_what_explains_most_alone_may_speak_against_the_base(monkeypatch: pytest
 def test_what_is_found_may_speak_against_the_first_choice(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("host.diagnosis.diagnose.ways", lambda recordings: ways(recordings)[::-1])
     monkeypatch.setattr("host.diagnosis.diagnose.by_single_effects", lambda found, *_: found)
+    begun: list[Explanation | None] = []
+    found_so: list[Explanation] = []
+
+    def explain_and_note(*args: Any, like: Explanation | None) -> Explained:
+        begun.append(like)
+        explained = explain(*args, like=like)
+        found_so.append(explained.best)
+        return explained
+
+    monkeypatch.setattr("host.diagnosis.diagnose.explain", explain_and_note)
     found = diagnose([dive("moving")])
+    assert begun == [None, found_so[0]]  # what was found with the plane the wrong way is begun with
+    assert found.ranking
     assert found.verdict == "no_mismatch"
     assert NOTE in found.recordings[0].notes

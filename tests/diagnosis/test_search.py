@@ -64,6 +64,22 @@ def test_what_every_vehicle_has_joins_at_once() -> None:
     assert found.bic < wrong.bic
 
 
+def test_beside_a_set_that_is_begun_with_all_that_every_vehicle_has_is_asked() -> None:
+    true = {"c_wq": 0.9, "c_ww": -0.8, "c_qq": -3.0, "c_qw": 0.5, "lag_time": 0.15}
+    names = frozenset({
+        "heave_pitch_rate_coupling", "heave_quadratic_drag", "pitch_quadratic_damping", "munk_moment",
+        "actuator_lag",
+    })  # fmt: skip
+    fitter, said = Fitter([flown(true, names)]), list[str]()
+    bent = names - {"heave_quadratic_drag"} | {"trim_moment"}
+    wrong = fitted(fitter, bent, true | {"c_q0": 0.0})
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, said.append, fitter.base, fitter.root)
+        found = search.run([wrong])
+    assert said == ["settling", "all that every vehicle has"]
+    assert found.names == names
+
+
 def test_of_many_what_had_an_equal_is_exchanged_again_beside_another_member(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
