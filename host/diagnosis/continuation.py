@@ -46,7 +46,7 @@ FEW_STEPS, STEPS = 10, 40  # of the parameters at one stage: many lie along a ri
 SPEED = NAMES.index("u0")
 APPARENT = ("pitch_bias", "vertical_current")
 """What no free trim does where heave is not linear, nor shows at one step from a set bent without them."""
-LOST = 2.0  # of BIC a sample, to the best stage: the last ones lead nowhere
+LOST = 0.7  # of BIC a sample, to the best stage: the last ones lead nowhere
 BEHIND = 0.1  # of BIC a sample, to the best of the same stage: it leads nowhere
 
 

@@ -18,6 +18,7 @@ from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import is_above_floor
 from host.diagnosis.margins import FEW, LITTLE, MUCH, SMALL, margin
 from host.diagnosis.pruning import pruned
+from host.diagnosis.starts import is_far
 from host.diagnosis.trims import retrimmed
 from host.diagnosis.workers import Task
 from host.gauss_newton import Point
@@ -34,7 +35,8 @@ def together(search: "Search", leading: Explanation) -> Explanation | None:
     """The leading set with all that every vehicle has, more if need be, pruned; None if too much is left.
 
     Where it has led astray, all that every vehicle has by continuation, which needs no set to begin with, but
-    takes longest.
+    takes longest. Where that leaves more than a little, but a fraction of what the leading set does, it stays
+    as it is: a few effects more come nowhere near.
     """
     search.on_progress("what every vehicle has")
     fitter, best = search.fitter, _with_few_more(search, with_ordinary(search, leading))
@@ -48,7 +50,8 @@ def together(search: "Search", leading: Explanation) -> Explanation | None:
     if fitter.excess(best.fit) > LITTLE and (end := _by_continuation(search)) is not None:
         best = with_more(search, min(end, best, key=lambda e: e.bic))
     if fitter.excess(best.fit) > LITTLE and is_above_floor(fitter, best.fit):
-        return None
+        is_out_of_reach = fitter.excess(best.fit) < MUCH and is_far(fitter, leading)
+        return best if is_out_of_reach else None
     best = pruned(search, best)
     return best if best.bic < leading.bic else None
 

@@ -99,7 +99,19 @@ def test_where_more_that_joins_does_not_help_a_continuation_begins_anew(
 def test_what_is_left_within_the_doubt_about_the_sensors_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     search = Rounds([1.26], False, monkeypatch)
     assert found(search) is search.sets[0]
-    assert found(Rounds([1.26], True, monkeypatch)) is None
+    assert found(Rounds([2.6], True, monkeypatch)) is None
+
+
+@pytest.mark.parametrize(
+    ("left", "leading", "stays"), [(1.4, 20.0, True), (1.4, 3.0, False), (2.4, 20.0, False)]
+)
+def test_what_a_few_effects_do_not_come_near_stays_though_something_is_left(
+    left: float, leading: float, stays: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search = Rounds([left], True, monkeypatch)
+    search.leading.fit = leading
+    monkeypatch.setattr(module, "pruned", lambda *_: pytest.fail("pruned"))
+    assert found(search) is (search.sets[0] if stays else None)
 
 
 @pytest.mark.parametrize("left", [1.05, 1.6])
