@@ -13,6 +13,7 @@ from host.valleys import log_prior
 RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exact twins
 FOREIGN = 8.0  # of BIC, against each form of unknown physics: odds of 50 to 1 for an entry as likely
 LONELY = 8.0  # of BIC, against what seldom acts without another effect that is not there: odds of 50 to 1
+AT_AN_END, HARDLY_CHANGES = 2.0, 8.0  # s; of BIC: what changed there all but acts always, or never
 LEAST_COUPLING, MOST_COUPLING, COUPLING_SPREAD = 0.0, 0.8, 0.2  # of the forward speed
 
 
@@ -20,9 +21,9 @@ def charged_bic(fit: Fit, names: Names, coefficients: int, longest: Recording) -
     """Bayesian information criterion of a fit with so many free coefficients of effects; lower is better.
 
     Charged as well: a speed, a damping or a coupling that is hardly likely, what not every vehicle has, or
-    not by itself, or what the catalogue does not hold, and the choice among all the periods that an
-    oscillation could have had. Not charged: what beside an effect's other coefficients makes no difference on
-    this recording.
+    not by itself, or what the catalogue does not hold, a change as the recording begins or ends, and the
+    choice among all the periods that an oscillation could have had. Not charged: what beside an effect's
+    other coefficients makes no difference on this recording.
 
     longest  of the recordings, which tells most periods apart
     """
@@ -30,8 +31,17 @@ def charged_bic(fit: Fit, names: Names, coefficients: int, longest: Recording) -
     unlikely = -2.0 * log_prior(fit) + _strange_coupling(fit) + FOREIGN * len(names & UNKNOWN.keys())
     chosen = sum(2.0 * log(_periods_within(named(name).periods, longest)) for name in names)
     lonely = sum(not {named(name).beside} <= names | {None} for name in names)
+    unlikely += HARDLY_CHANGES * _changes_at_an_end(fit, longest)
     told = coefficients - _untold(fit, names)
     return fit.bic + told * log(fit.samples) + RARITY * rare + LONELY * lonely + unlikely + chosen
+
+
+def _changes_at_an_end(fit: Fit, longest: Recording) -> int:
+    """How many moments lie so near to where the recording begins or ends that hardly anything is changed."""
+    own = zip(fit.structure.names, fit.parameters, fit.free, strict=True)
+    moments = [time for name, time, is_free in own if is_free and name in fit.structure.moments]
+    first, last = longest.time[0] + AT_AN_END, longest.time[-1] - AT_AN_END
+    return sum(not first < time < last for time in moments)
 
 
 def _untold(fit: Fit, names: Names) -> int:

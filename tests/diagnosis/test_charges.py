@@ -7,7 +7,7 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.catalogue import named
-from host.diagnosis.charges import FOREIGN, RARITY
+from host.diagnosis.charges import FOREIGN, HARDLY_CHANGES, RARITY
 from host.diagnosis.deviations import deviations, interval
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
@@ -53,3 +53,18 @@ def test_a_form_of_unknown_physics_is_charged_beyond_its_coefficients(fitter: Fi
     fit = fitter.grown(fitter.base, "heave_quadratic_drag", []).fit
     assert fitter.free_parameters(entry) == fitter.free_parameters(form)
     assert fitter.bic(fit, form) - fitter.bic(fit, entry) == pytest.approx(FOREIGN + RARITY)
+
+
+@pytest.mark.parametrize(("moment", "is_charged"), [(1.0, True), (30.0, False), (58.9, True)])
+def test_a_change_as_the_recording_begins_or_ends_is_charged(
+    moment: float, is_charged: bool, fitter: Fitter
+) -> None:
+    change = frozenset({"ballast_change"})
+    fit = fitter.grown(fitter.base, "ballast_change", []).fit
+    at = fit.structure.names.index("ballast_time")
+
+    def changed(time: float) -> Fit:
+        return replace(fit, parameters=np.where(np.arange(fit.parameters.size) == at, time, fit.parameters))
+
+    charge = fitter.bic(changed(moment), change) - fitter.bic(changed(20.0), change)
+    assert charge == pytest.approx(HARDLY_CHANGES * is_charged)
