@@ -1,5 +1,6 @@
 """What the bench commands share: the vehicle file, the recordings, progress, and a word about the extra."""
 
+import argparse
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -26,6 +27,16 @@ def require_bench() -> None:
             f"this command needs {', '.join(missing)}, which the companion install leaves out: "
             "pip install '.[bench]' in its source folder"
         )
+
+
+def add_leave_out(parser: argparse.ArgumentParser) -> None:
+    """--leave-out: stretches of a recording that are not looked at, to be read by host.left_out."""
+    parser.add_argument(
+        "--leave-out",
+        default="",
+        metavar="START-END,...",
+        help="seconds of the recording that are not looked at, as 60-80,120-140 (turns, say)",
+    )
 
 
 def load_vehicle(path: Path | None) -> Vehicle:

@@ -160,7 +160,10 @@ def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfi
     elif left.is_nothing:
         kind = "what was learnt does not hold on the stretches that were held out"
     elif left.is_no_sea:
-        kind = "it acts like noise, but too weakly for a sea: physics left out that comes and goes"
+        kind = (
+            "it acts like noise, but too weakly for a sea: physics left out that comes and goes "
+            "(turns, say: --leave-out START-END)"
+        )
     elif left.is_coloured:
         kind = "it does not follow the motion: a disturbance with a rhythm or a drift of its own"
     else:

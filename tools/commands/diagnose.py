@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from host.recording import Recording
-from tools.bench import load_vehicle, progress, read_all, require_bench, tell_notes
+from tools.bench import add_leave_out, load_vehicle, progress, read_all, require_bench, tell_notes
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what changed at about this time of the recording (default: at the first alarm of a journal)",
     )
     part.add_argument("--whole", action="store_true", help="all of a journal, whatever alarms it holds")
+    add_leave_out(parser)
     parser.add_argument("--vehicle", type=Path, help="vehicle file: columns, units, channels, speed")
     parser.add_argument(
         "--out",
@@ -52,21 +53,26 @@ def run(args: argparse.Namespace) -> int:
     if args.jobs is not None and args.jobs < 1:
         print("mils: --jobs must be at least 1", file=sys.stderr)
         return 2
-    if args.around is not None and args.simulation is not None:
-        print(
-            "mils: --around cannot be used with --simulation; cut both files to the same part",
-            file=sys.stderr,
-        )
-        return 2
+    for option in ("around", "leave_out"):
+        if getattr(args, option) and args.simulation is not None:
+            flag = "--" + option.replace("_", "-")
+            print(
+                f"mils: {flag} cannot be used with --simulation; cut both files to the same part",
+                file=sys.stderr,
+            )
+            return 2
     jobs = args.jobs if args.jobs is not None else min(8, len(os.sched_getaffinity(0)))
     vehicle = load_vehicle(args.vehicle)
     require_bench()
     from host.afloat import under_water
+    from host.left_out import spans_in, without
     from host.model import read_model
 
+    leave_out = spans_in(args.leave_out)
     model = read_model(args.model) if args.model is not None else None
     with progress(args.quiet) as say:
-        recordings = _part(under_water(read_all(args.recordings, vehicle, say)), args)
+        dives = without(under_water(read_all(args.recordings, vehicle, say)), leave_out)
+        recordings = _part(dives, args)
         from host.catalogue import named
         from host.diagnosis.answer import Answer
         from host.diagnosis.deviations import interval

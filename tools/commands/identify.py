@@ -3,7 +3,15 @@
 import argparse
 from pathlib import Path
 
-from tools.bench import joint_or_each, load_vehicle, progress, read_all, require_bench, tell_notes
+from tools.bench import (
+    add_leave_out,
+    joint_or_each,
+    load_vehicle,
+    progress,
+    read_all,
+    require_bench,
+    tell_notes,
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, default=Path("."), metavar="DIR", help="where model.json and report.html go"
     )
+    add_leave_out(parser)
     parser.add_argument("--quiet", action="store_true", help="no progress")
 
 
@@ -30,14 +39,15 @@ def run(args: argparse.Namespace) -> int:
     require_bench()
     from host.afloat import under_water
     from host.identify import identify
+    from host.left_out import spans_in, without
     from host.model import write_model
     from host.report import advice, unit_of, write_report
     from host.verdict import verdict
 
-    vehicle = load_vehicle(args.vehicle)
+    vehicle, leave_out = load_vehicle(args.vehicle), spans_in(args.leave_out)
     worst = 0
     with progress(args.quiet) as say:
-        read = under_water(read_all(args.recordings, vehicle, say))
+        read = without(under_water(read_all(args.recordings, vehicle, say)), leave_out)
         for recordings, folder in joint_or_each(read, args.out, args.each):
             result = identify(recordings, vehicle, args.method, say)
             folder.mkdir(parents=True, exist_ok=True)
