@@ -37,6 +37,7 @@ USUAL_SPEED, SPEED_FACTOR = 1.5, 3.0  # m/s; gliders make 0.3, torpedoes 10
 USUAL_DAMPING, DAMPING_FACTOR = -1.0, 5.0  # 1/s, of a1; gliders 0.1, small quick hulls 6
 # 1/s, of a1: a model that lacks an effect may follow its plane at once, or hardly at all.
 INSTANT, IDLE = -10.0, -0.1
+STANDING = 0.1  # m/s: no plane works at less
 A1, A2, A3, B1, B2, U0 = (NAMES.index(name) for name in ("a1", "a2", "a3", "b1", "b2", "u0"))
 LAGS, DEPTH_LAG, MUNK, COUPLING = ("lag_time", "pitch_lag_time"), "depth_lag_time", "c_qw", "c_wq"
 STALL, STALL_LOSS, STALL_FACTORS = "stall_angle", "stall_loss", (0.6, 0.75, 1.35, 1.7)
@@ -206,14 +207,15 @@ def _with_heave_swapped(point: Point) -> list[Point]:
 
 
 def has_usual_heave(point: Point) -> bool:
-    """Whether heave neither follows the plane at once nor hardly moves."""
-    return bool(INSTANT < point.parameters[A1] < IDLE)
+    """Whether heave neither follows the plane at once nor hardly moves, and does not do the speed's work."""
+    return bool(INSTANT < point.parameters[A1] < IDLE and point.parameters[U0] > STANDING)
 
 
 def with_usual_heave(start: Point) -> list[Point]:
     """Starts with the heave damping of a usual vehicle.
 
     If heave was fast, with the same steady velocity; if it hardly moved, with a plane that pushes either way.
+    A vehicle that stood still gets a usual speed, too.
     """
     a1, b1, b2 = start.parameters[[A1, B1, B2]]
     usual = USUAL_LEVER * b2
@@ -222,6 +224,8 @@ def with_usual_heave(start: Point) -> list[Point]:
     for force in forces:
         parameters = start.parameters.copy()
         parameters[[A1, B1]] = USUAL_DAMPING, force
+        if parameters[U0] < STANDING:
+            parameters[U0] = USUAL_SPEED
         starts.append(replace(start, parameters=parameters))
     return starts
 

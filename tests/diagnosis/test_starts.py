@@ -19,6 +19,7 @@ from host.output_error import output_error
 from host.propagate import free_run, inputs_of
 from host.recording import Array, Recording
 from host.valleys import (
+    has_usual_heave,
     other_valleys,
     with_depth_lag_swapped,
     with_force_mirrored,
@@ -278,6 +279,15 @@ def test_a_heave_that_hardly_moves_begins_again_with_a_plane_that_pushes_either_
     fast = replace(slow, parameters=np.array([-20.0, -3.4, -8.2, 20.0 * b1, -4.0, 2.5, 0.0, 0.0]))
     (start,) = with_usual_heave(fast)
     assert tuple(start.parameters[[0, 3]]) == pytest.approx((-1.0, b1))
+
+
+def test_a_vehicle_that_stands_still_begins_again_at_a_usual_speed() -> None:
+    standing = np.array([-0.2, -9.5, -1.8, 0.9, -3.0, 0.0, 0.0, 0.0])
+    still = Point(structure_of(()), standing, [AT_REST], np.zeros(4))
+    slow = replace(still, parameters=np.where(np.arange(8) == 5, 0.3, standing))  # a glider
+    assert not has_usual_heave(still)
+    assert has_usual_heave(slow)
+    assert [tuple(start.parameters[[0, 5]]) for start in with_usual_heave(still)] == [(-1.0, 1.5)] * 2
 
 
 def test_the_depth_tells_which_of_the_poles_is_the_lag() -> None:
