@@ -39,6 +39,7 @@ DRIFT = (
 )
 CORRECTED = " The model corrects the measured speed, which errs, by the surge equation (speed_correction)."
 CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
+NEARLY_CANCELLED = 0.85  # the same of one channel, beside a drag: by chance one in thirty
 LARGEST_SHARE = 4.0  # of what geometry gives, that bounds allow
 NEARLY = 1.0 - 1e-6  # of a bound: at it
 KNOWN = 1.0 / 3.0  # of it, is what a deviation may be there, if to end at a bound is to tell anything
@@ -76,12 +77,20 @@ def rare_in(explanation: Explanation) -> list[str]:
 
 
 def cancelling_in(explanation: Explanation) -> list[str]:
-    """A zero error of the plane, a weight and a moment, where the first all but undoes the others."""
+    """A zero error of the plane, a weight and a moment, where the first all but undoes the others.
+
+    Or a drag, a weight and a current that all but undoes it: together they are a drag to one side only.
+    """
+    fit = explanation.fit
+    p = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
+    one_sided = ["heave_quadratic_drag", "net_buoyancy", "vertical_current"]
+    if explanation.names.issuperset(one_sided):
+        weight, current = p["c_w0"], -p["a1"] * p["current"]
+        if abs(weight + current) < (1.0 - NEARLY_CANCELLED) * max(abs(weight), abs(current)):
+            return one_sided
     offsets = ["net_buoyancy", "rudder_offset", "trim_moment"]
     if not explanation.names.issuperset(offsets):
         return []
-    fit = explanation.fit
-    p = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
     pairs = ((p["c_w0"], p["b1"] * p["rudder_zero"]), (p["c_q0"], p["b2"] * p["rudder_zero"]))
     is_cancelled = all(abs(one + other) < (1.0 - CANCELLED) * abs(one) for one, other in pairs)
     return offsets if is_cancelled else []

@@ -107,6 +107,24 @@ def test_offsets_that_cancel_are_doubted_by_name(
     assert not cancelling_in(replace(best, names=offsets - {"trim_moment"}))
 
 
+@pytest.mark.parametrize(("share", "is_doubted"), [(0.95, True), (-0.95, False), (0.5, False)])
+def test_a_current_that_cancels_a_weight_beside_a_drag_is_doubted(
+    base: Explanation, share: float, is_doubted: bool
+) -> None:
+    names = frozenset({"heave_quadratic_drag", "net_buoyancy", "vertical_current"})
+    structure = structure_of(names)
+    known = dict(zip(base.fit.structure.names, base.fit.parameters.tolist(), strict=True))
+    known |= {"c_ww": -1.0, "c_w0": 0.01, "current": share * 0.01 / known["a1"]}
+    values = np.array([known[name] for name in structure.names])
+    free, information = np.ones(values.size, dtype=bool), np.eye(values.size)
+    fit = replace(base.fit, structure=structure, parameters=values, free=free, information=information)
+    best = Explanation(names, fit, base.bic)
+    assert bool(cancelling_in(best)) == is_doubted
+    verdict = verdict_on(best, leftover(), misfit(5.0), misfit(1.0))
+    assert verdict == ("partly_explained" if is_doubted else "explained")
+    assert not cancelling_in(replace(best, names=names - {"heave_quadratic_drag"}))
+
+
 @pytest.mark.parametrize(
     ("own", "value", "std", "doubted"),
     [
