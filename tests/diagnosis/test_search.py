@@ -8,6 +8,7 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import CATALOGUE, ORDINARY, structure_of
+from host.diagnosis import search as module
 from host.diagnosis.charges import LONELY, RARITY
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
@@ -64,20 +65,25 @@ def test_what_every_vehicle_has_joins_at_once() -> None:
     assert found.bic < wrong.bic
 
 
-def test_beside_a_set_that_is_begun_with_all_that_every_vehicle_has_is_asked() -> None:
-    true = {"c_wq": 0.9, "c_ww": -0.8, "c_qq": -3.0, "c_qw": 0.5, "lag_time": 0.15}
-    names = frozenset({
+def test_beside_a_set_that_is_begun_with_all_that_every_vehicle_has_is_asked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fitter, asked = Fitter([hidden_dive(duration=40.0)]), list[str]()
+    many = frozenset({
         "heave_pitch_rate_coupling", "heave_quadratic_drag", "pitch_quadratic_damping", "munk_moment",
         "actuator_lag",
     })  # fmt: skip
-    fitter, said = Fitter([flown(true, names)]), list[str]()
-    bent = names - {"heave_quadratic_drag"} | {"trim_moment"}
-    wrong = fitted(fitter, bent, true | {"c_q0": 0.0})
+    begun = replace(fitter.base, names=many, bic=fitter.base.bic - 100.0)
     with Workers(fitter, 1) as workers:
-        search = Search(fitter, workers, said.append, fitter.base, fitter.root)
-        found = search.run([wrong])
-    assert said == ["settling", "all that every vehicle has"]
-    assert found.names == names
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        monkeypatch.setattr(Search, "_settled", lambda _, best: best)
+        for name in ("whole", "told_by_the_usual"):
+            monkeypatch.setattr(module, name, lambda _, one, name=name: asked.append(name) or one)
+        assert search.run([begun]).names == many
+        assert asked == ["whole", "told_by_the_usual"]
+        search.part = search  # what was found on a part of the recordings was asked there
+        assert search.run([begun]).names == many
+    assert asked == ["whole", "told_by_the_usual"]
 
 
 def test_of_many_what_had_an_equal_is_exchanged_again_beside_another_member(
