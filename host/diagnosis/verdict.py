@@ -40,6 +40,11 @@ DRIFT = (
 CORRECTED = " The model corrects the measured speed, which errs, by the surge equation (speed_correction)."
 CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
 NEARLY_CANCELLED = 0.85  # the same of one channel, beside a drag: by chance one in thirty
+MOST_COUPLING = 2.0  # times the forward speed: masses allow for less than one (host.diagnosis.charges)
+MOST_MUNK, LEAST_LEVER = (
+    6.0,
+    1.0,
+)  # times all of heave's damping at the plane; 1/m, of its moment over its force
 LARGEST_SHARE = 4.0  # of what geometry gives, that bounds allow
 NEARLY = 1.0 - 1e-6  # of a bound: at it
 KNOWN = 1.0 / 3.0  # of it, is what a deviation may be there, if to end at a bound is to tell anything
@@ -119,6 +124,22 @@ def beyond_bounds_in(explanation: Explanation) -> list[str]:
     return sorted({*found})
 
 
+def beyond_geometry_in(explanation: Explanation) -> list[str]:
+    """A coupling of pitch rate into heave, or a Munk moment, beyond what any hull makes of its water.
+
+    c_wq / u0 is a ratio of masses. At the plane's lever all of heave's damping would turn the hull by
+    |c_qw| = |a1 b2 / b1|; published hulls have 0.1 to 0.9 of that, drawn ones up to 1.7.
+    """
+    fit = explanation.fit
+    p = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
+    lever = max(abs(p["b2"]) / max(abs(p["b1"]), 1e-9), LEAST_LEVER)
+    sizes = {
+        "heave_pitch_rate_coupling": abs(p.get("c_wq", 0.0)) / (MOST_COUPLING * max(p["u0"], 1e-3)),
+        "munk_moment": abs(p.get("c_qw", 0.0)) / (MOST_MUNK * abs(p["a1"]) * lever),
+    }
+    return [name for name, size in sizes.items() if name in explanation.names and size > 1.0]
+
+
 def _doubt(explanation: Explanation, waves: float) -> str:
     """Why a set that leaves nothing may yet be none that acts; empty where nothing speaks against it."""
     if waves < FAINT_WAVES:
@@ -128,6 +149,7 @@ def _doubt(explanation: Explanation, waves: float) -> str:
         (rare if len(rare) > MOST_RARE else [], "seldom act at once: together"),
         (cancelling_in(explanation), "cancel: together"),
         (beyond_bounds_in(explanation), "would have to be larger than on any vehicle:"),
+        (beyond_geometry_in(explanation), "would have to be larger than on any hull:"),
     )
     for names, why in reasons:
         if names:

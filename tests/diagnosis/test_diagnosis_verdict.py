@@ -14,6 +14,7 @@ from host.diagnosis.scoring import Misfit
 from host.diagnosis.verdict import (
     Verdict,
     beyond_bounds_in,
+    beyond_geometry_in,
     cancelling_in,
     rare_in,
     remaining,
@@ -123,6 +124,33 @@ def test_a_current_that_cancels_a_weight_beside_a_drag_is_doubted(
     verdict = verdict_on(best, leftover(), misfit(5.0), misfit(1.0))
     assert verdict == ("partly_explained" if is_doubted else "explained")
     assert not cancelling_in(replace(best, names=names - {"heave_quadratic_drag"}))
+
+
+@pytest.mark.parametrize(
+    ("effect", "own", "share", "is_doubted"),
+    [
+        ("heave_pitch_rate_coupling", "c_wq", 1.9, False),
+        ("heave_pitch_rate_coupling", "c_wq", -2.1, True),
+        ("munk_moment", "c_qw", 5.9, False),
+        ("munk_moment", "c_qw", -6.1, True),
+    ],
+)
+def test_what_no_hull_makes_of_its_water_is_doubted(
+    base: Explanation, effect: str, own: str, share: float, is_doubted: bool
+) -> None:
+    structure = structure_of(frozenset({effect}))
+    known = dict(zip(base.fit.structure.names, base.fit.parameters.tolist(), strict=True))
+    at_the_plane = abs(known["a1"] * known["b2"] / known["b1"])
+    known |= {own: share * (known["u0"] if own == "c_wq" else at_the_plane)}
+    values = np.array([known[name] for name in structure.names])
+    free, information = np.ones(values.size, dtype=bool), np.eye(values.size)
+    fit = replace(base.fit, structure=structure, parameters=values, free=free, information=information)
+    best = Explanation(frozenset({effect}), fit, base.bic)
+    assert beyond_geometry_in(best) == [effect] * is_doubted
+    verdict = verdict_on(best, leftover(), misfit(5.0), misfit(1.0))
+    assert verdict == ("partly_explained" if is_doubted else "explained")
+    said = remaining(verdict, best, leftover(), misfit(1.0))
+    assert ("larger than on any hull" in said) == is_doubted
 
 
 @pytest.mark.parametrize(
