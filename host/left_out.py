@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from math import inf
 
 from host.errors import RecordingError
 from host.recording import Recording
@@ -36,9 +37,7 @@ def without(recordings: list[Recording], spans: list[Span]) -> list[Recording]:
         raise RecordingError("--leave-out takes one recording: its seconds are those of one file")
     pieces = recordings
     for start, end in spans:
-        pieces = [
-            part for one in pieces for part in (one.between(0.0, start), one.between(end, float("inf")))
-        ]
+        pieces = [part for one in pieces for part in (one.between(-inf, start), one.between(end, inf))]
     pieces = [piece for piece in pieces if piece.time.size > 1 and piece.duration >= LEAST_KEPT]
     if not pieces:
         raise RecordingError(f"{name}: --leave-out leaves nothing of it")

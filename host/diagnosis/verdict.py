@@ -41,10 +41,8 @@ CORRECTED = " The model corrects the measured speed, which errs, by the surge eq
 CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
 NEARLY_CANCELLED = 0.85  # the same of one channel, beside a drag: by chance one in thirty
 MOST_COUPLING = 2.0  # times the forward speed: masses allow for less than one (host.diagnosis.charges)
-MOST_MUNK, LEAST_LEVER = (
-    6.0,
-    1.0,
-)  # times all of heave's damping at the plane; 1/m, of its moment over its force
+MOST_MUNK = 6.0  # times what all of heave's damping would do at the plane
+LEAST_LEVER = 1.0  # 1/m, of the plane's moment over its force: less is a plane amidships
 LARGEST_SHARE = 4.0  # of what geometry gives, that bounds allow
 NEARLY = 1.0 - 1e-6  # of a bound: at it
 KNOWN = 1.0 / 3.0  # of it, is what a deviation may be there, if to end at a bound is to tell anything

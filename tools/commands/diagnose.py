@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
         print("mils: --jobs must be at least 1", file=sys.stderr)
         return 2
     for option in ("around", "leave_out"):
-        if getattr(args, option) and args.simulation is not None:
+        if getattr(args, option) not in (None, "") and args.simulation is not None:
             flag = "--" + option.replace("_", "-")
             print(
                 f"mils: {flag} cannot be used with --simulation; cut both files to the same part",
