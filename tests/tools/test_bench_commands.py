@@ -92,6 +92,24 @@ def test_each_recording_gets_a_model_of_its_own(recording: Path, tmp_path: Path)
     assert (tmp_path / "second" / "model.json").exists()
 
 
+def test_what_is_left_out_teaches_nothing(
+    recording: Path, model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    header, *rows = recording.read_text().splitlines()
+    for k in range(300, 400):  # as if it turned
+        time, depth, pitch, rudder = rows[k].split(",")
+        rows[k] = f"{time},{float(depth) + 3.0},{0.5 * float(pitch) + 0.3},{rudder}"
+    turned = tmp_path / "turned.csv"
+    turned.write_text("\n".join([header, *rows]) + "\n")
+    main(["identify", str(turned), "--leave-out", "30-40", "--out", str(tmp_path), "--quiet"])
+    assert "left out as asked: 30 to 40 s" in capsys.readouterr().err
+    without, whole = (
+        json.loads((folder / "model.json").read_text())["parameters"] for folder in (tmp_path, model.parent)
+    )
+    for name in ("a2", "a3", "b2", "u0"):
+        assert without[name]["value"] == pytest.approx(whole[name]["value"], rel=0.1), name
+
+
 @pytest.mark.parametrize("method", ["car", "mils"])
 def test_regression_methods_say_that_noise_biases_them(
     recording: Path, tmp_path: Path, method: str, capsys: pytest.CaptureFixture[str]
@@ -128,6 +146,14 @@ def test_a_plane_that_never_moved_ends_with_no(tmp_path: Path, capsys: pytest.Ca
         (["identify", "{empty}"], "is empty"),
         (["identify", "{garbage}"], "is not UTF-8 text"),
         (["identify", "{recording}", "--vehicle", "nowhere.toml"], "nowhere.toml"),
+        (["identify", "{recording}", "--leave-out", "60-x"], "give START-END"),
+        (["identify", "{recording}", "--leave-out", "0-100"], "leaves nothing"),
+        (["diagnose", "{recording}", "--leave-out", "7", "--quiet"], "give START-END"),
+        (
+            ["diagnose", "{recording}", "--leave-out", "6-9", "--simulation", "{recording}"],
+            "--leave-out cannot",
+        ),
+        (["diagnose", "{recording}", "--around", "0", "--simulation", "{recording}"], "--around cannot"),
         (["predict", "{recording}", "{recording}"], "is not a model file"),
     ],
 )
