@@ -89,18 +89,27 @@ def test_what_explains_all_but_the_stretches_that_were_held_out_says_so(base: Ex
     assert "held out pitch is off by 3.0 times it" in remaining("explained", one, leftover(), misfit(9.0))
 
 
+def values_of(base: Explanation) -> dict[str, float]:
+    return dict(zip(base.fit.structure.names, base.fit.parameters.tolist(), strict=True))
+
+
+def explanation_with(base: Explanation, names: frozenset[str], known: dict[str, float]) -> Explanation:
+    """A set with these coefficients, each known to a deviation of 1."""
+    structure = structure_of(names)
+    values = np.array([known[name] for name in structure.names])
+    free, information = np.ones(values.size, dtype=bool), np.eye(values.size)
+    fit = replace(base.fit, structure=structure, parameters=values, free=free, information=information)
+    return Explanation(names, fit, base.bic)
+
+
 @pytest.mark.parametrize(("left_over", "verdict"), [(0.01, "partly_explained"), (0.2, "explained")])
 def test_offsets_that_cancel_are_doubted_by_name(
     base: Explanation, left_over: float, verdict: Verdict
 ) -> None:
     offsets = frozenset({"net_buoyancy", "rudder_offset", "trim_moment"})
-    structure = structure_of(offsets)
-    known = dict(zip(base.fit.structure.names, base.fit.parameters.tolist(), strict=True))
+    known = values_of(base)
     known |= {"rudder_zero": 0.2, "c_w0": -0.2 * known["b1"], "c_q0": -0.2 * known["b2"] * (1.0 + left_over)}
-    values = np.array([known[name] for name in structure.names])
-    free, information = np.ones(values.size, dtype=bool), np.eye(values.size)
-    fit = replace(base.fit, structure=structure, parameters=values, free=free, information=information)
-    best = Explanation(offsets, fit, base.bic)
+    best = explanation_with(base, offsets, known)
     assert bool(cancelling_in(best)) == (verdict == "partly_explained")
     assert verdict_on(best, leftover(), misfit(5.0), misfit(1.0)) == verdict
     said = remaining(verdict, best, leftover(), misfit(1.0))
@@ -113,13 +122,9 @@ def test_a_current_that_cancels_a_weight_beside_a_drag_is_doubted(
     base: Explanation, share: float, is_doubted: bool
 ) -> None:
     names = frozenset({"heave_quadratic_drag", "net_buoyancy", "vertical_current"})
-    structure = structure_of(names)
-    known = dict(zip(base.fit.structure.names, base.fit.parameters.tolist(), strict=True))
+    known = values_of(base)
     known |= {"c_ww": -1.0, "c_w0": 0.01, "current": share * 0.01 / known["a1"]}
-    values = np.array([known[name] for name in structure.names])
-    free, information = np.ones(values.size, dtype=bool), np.eye(values.size)
-    fit = replace(base.fit, structure=structure, parameters=values, free=free, information=information)
-    best = Explanation(names, fit, base.bic)
+    best = explanation_with(base, names, known)
     assert bool(cancelling_in(best)) == is_doubted
     verdict = verdict_on(best, leftover(), misfit(5.0), misfit(1.0))
     assert verdict == ("partly_explained" if is_doubted else "explained")
@@ -138,14 +143,10 @@ def test_a_current_that_cancels_a_weight_beside_a_drag_is_doubted(
 def test_what_no_hull_makes_of_its_water_is_doubted(
     base: Explanation, effect: str, own: str, share: float, is_doubted: bool
 ) -> None:
-    structure = structure_of(frozenset({effect}))
-    known = dict(zip(base.fit.structure.names, base.fit.parameters.tolist(), strict=True))
+    known = values_of(base)
     at_the_plane = abs(known["a1"] * known["b2"] / known["b1"])
     known |= {own: share * (known["u0"] if own == "c_wq" else at_the_plane)}
-    values = np.array([known[name] for name in structure.names])
-    free, information = np.ones(values.size, dtype=bool), np.eye(values.size)
-    fit = replace(base.fit, structure=structure, parameters=values, free=free, information=information)
-    best = Explanation(frozenset({effect}), fit, base.bic)
+    best = explanation_with(base, frozenset({effect}), known)
     assert beyond_geometry_in(best) == [effect] * is_doubted
     verdict = verdict_on(best, leftover(), misfit(5.0), misfit(1.0))
     assert verdict == ("partly_explained" if is_doubted else "explained")
