@@ -32,15 +32,19 @@ class Point:
 
 
 def whiten(error: Array, sensitivity: Array, variance: Array) -> tuple[Array, Array]:
-    """Multiplies by the inverse Cholesky factor of each row's 2 x 2 variance [S11, S12, S22] (3, N)."""
+    """Multiplies by the inverse Cholesky factor of each row's 2 x 2 variance [S11, S12, S22] (3, N).
+
+    What has run away becomes infinite, and no step leads there.
+    """
     l11 = np.sqrt(variance[0])
     l21 = variance[1] / l11
     l22 = np.sqrt(variance[2] - l21**2)
     white, scores = np.empty_like(error), np.empty_like(sensitivity)
-    white[0] = error[0] / l11
-    white[1] = (error[1] - l21 * white[0]) / l22
-    scores[0] = sensitivity[0] / l11
-    scores[1] = (sensitivity[1] - l21 * scores[0]) / l22
+    with np.errstate(over="ignore", invalid="ignore"):
+        white[0] = error[0] / l11
+        white[1] = (error[1] - l21 * white[0]) / l22
+        scores[0] = sensitivity[0] / l11
+        scores[1] = (sensitivity[1] - l21 * scores[0]) / l22
     return white, scores
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
 from host.catalogue import structure_of
-from host.gauss_newton import GaussNewton, Point
+from host.gauss_newton import GaussNewton, Point, whiten
 
 STRUCTURE = structure_of(("heave_quadratic_drag", "large_angle_kinematics"))
 NAMES = list(STRUCTURE.names)
@@ -88,3 +88,10 @@ def test_what_stops_early_on_a_ridge_hides_no_gain() -> None:
     step, cost = GaussNewton([(error, scores)], point, FREE), float(np.sum(error**2))
     assert step.promise() < 0.0
     assert step.predicted_cost(cost) < 0.8 * cost
+
+
+def test_sensitivities_that_ran_away_are_infinite_without_a_word() -> None:
+    variance = np.array([[1e-6], [1e-9], [1e-6]])
+    white, scores = whiten(np.full((2, 1), 1e-3), np.full((2, 1, 1), 1e307), variance)
+    assert np.isfinite(white).all()
+    assert not np.isfinite(scores).any()
