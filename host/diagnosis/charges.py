@@ -31,9 +31,9 @@ def charged_bic(fit: Fit, names: Names, coefficients: int, longest: Recording) -
     unlikely = -2.0 * log_prior(fit) + _strange_coupling(fit) + FOREIGN * len(names & UNKNOWN.keys())
     chosen = sum(2.0 * log(_periods_within(named(name).periods, longest)) for name in names)
     lonely = sum(not {named(name).beside} <= names | {None} for name in names)
-    unlikely += HARDLY_CHANGES * _changes_at_an_end(fit, longest)
+    seldom = RARITY * rare + LONELY * lonely + HARDLY_CHANGES * _changes_at_an_end(fit, longest)
     told = coefficients - _untold(fit, names)
-    return fit.bic + told * log(fit.samples) + RARITY * rare + LONELY * lonely + unlikely + chosen
+    return fit.bic + told * log(fit.samples) + seldom + unlikely + chosen
 
 
 def _changes_at_an_end(fit: Fit, longest: Recording) -> int:

@@ -39,7 +39,7 @@ SAME_END, SAME_SPEED = 3.0, 0.05  # of BIC, and of the speed, between two fits o
 CLEARLY = 50.0  # of BIC, that each must gain by then and at the end, where nothing seems to be lacking
 PROMISING, MOST_PROMISING = 2, 3  # effects that are tried where one may join, and at the first stage
 PLACES = 2  # in which each of them begins
-FAIR_PART = 0.3  # of what its last stages lost, that an effect must gain to join
+REGAINED = 0.3  # of what the last stages lost, by an effect that may join
 FAR_MORE = 3.0  # times what was left when no effect helped: fewer forces make up for less
 SLIGHTLY = 1.05  # times the variance expected: enough for another look at the moments
 FEW_STEPS, STEPS = 10, 40  # of the parameters at one stage: many lie along a ridge, where a stage is slow
@@ -72,7 +72,7 @@ def continued(search: "Search", names: Names, most_beside: int) -> Explanation |
             if left < most and lost < most_lost:
                 break
             larger = _best_of_each(_larger(search, followed[0], PROMISING))[:1]
-            if not larger or larger[0].bic > followed[0].bic - max(NAMING_MARGIN, FAIR_PART * lost):
+            if not larger or larger[0].bic > followed[0].bic - max(NAMING_MARGIN, REGAINED * lost):
                 most, most_lost = FAR_MORE * left, max(most_lost, FAR_MORE * lost)
                 break
             most, most_lost = LITTLE, NAMING_MARGIN

@@ -40,8 +40,10 @@ DRIFT = (
 CORRECTED = " The model corrects the measured speed, which errs, by the surge equation (speed_correction)."
 CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
 NEARLY_CANCELLED = 0.85  # the same of one channel, beside a drag: by chance one in thirty
-MOST_COUPLING = 2.0  # times the forward speed: masses allow for less than one (host.diagnosis.charges)
-MOST_MUNK = 6.0  # times what all of heave's damping would do at the plane
+NO_COUPLING = (
+    2.0  # times the forward speed, is so large: masses allow for less than one (host.diagnosis.charges)
+)
+NO_MUNK = 6.0  # times what all of heave's damping would do at the plane
 LEAST_LEVER = 1.0  # 1/m, of the plane's moment over its force: less is a plane amidships
 LARGEST_SHARE = 4.0  # of what geometry gives, that bounds allow
 NEARLY = 1.0 - 1e-6  # of a bound: at it
@@ -132,8 +134,8 @@ def beyond_geometry_in(explanation: Explanation) -> list[str]:
     p = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
     lever = max(abs(p["b2"]) / max(abs(p["b1"]), 1e-9), LEAST_LEVER)
     sizes = {
-        "heave_pitch_rate_coupling": abs(p.get("c_wq", 0.0)) / (MOST_COUPLING * max(p["u0"], 1e-3)),
-        "munk_moment": abs(p.get("c_qw", 0.0)) / (MOST_MUNK * abs(p["a1"]) * lever),
+        "heave_pitch_rate_coupling": abs(p.get("c_wq", 0.0)) / (NO_COUPLING * max(p["u0"], 1e-3)),
+        "munk_moment": abs(p.get("c_qw", 0.0)) / (NO_MUNK * abs(p["a1"]) * lever),
     }
     return [name for name, size in sizes.items() if name in explanation.names and size > 1.0]
 
