@@ -121,6 +121,7 @@ def _diagnosed(
     jobs: int,
     like: Explanation | None,
     ranking: Ranking,
+    is_second: bool = False,
 ) -> Diagnosis:
     """The diagnosis with the plane taken so, unless what is found speaks for another way.
 
@@ -132,13 +133,13 @@ def _diagnosed(
     if is_part:
         on_progress("an excerpt")
     with Workers(fitter, jobs) as workers:
-        explained = explain(fitter, workers, on_progress, way, like=like)
+        explained = explain(fitter, workers, on_progress, way, like=like, is_second=is_second)
         again = next((other for other in others if _is_likelier(other, explained)), None)
         if again is None and not is_part:
             judged = _judge(explained, spans, floor, on_progress)
     if again is not None:
         on_progress("the plane between rows")
-        return _diagnosed(again, [], on_progress, jobs, explained.best, _ranking(explained.search))
+        return _diagnosed(again, [], on_progress, jobs, explained.best, _ranking(explained.search), True)
     if is_part:
         on_progress("the whole")
         fitter = Fitter(spans.teaching)

@@ -1,6 +1,7 @@
 """From the recordings to the explanation: the search, then the doubt about what it found."""
 
 from collections.abc import Callable
+from functools import cached_property
 
 from host.catalogue import UNKNOWN
 from host.catalogue.nuisance import FREE_TRIM
@@ -35,8 +36,12 @@ def explain(
     way: Way,
     part: Explained | None = None,
     like: Explanation | None = None,
+    is_second: bool = False,
 ) -> Explained:
-    """Searches for the best explanation, or goes on from that of a part, where most has been settled."""
+    """Searches for the best explanation, or goes on from that of a part, where most has been settled.
+
+    is_second  the plane was taken the other way before, and all searched so
+    """
     if part is not None and part.left.is_by_speed:
         return again_astray(fitter, workers, on_progress, part)
     known = None if part is None else part.search
@@ -44,10 +49,10 @@ def explain(
         return again_in_drift(fitter, workers, on_progress, part)
     search = Search(fitter, workers, on_progress, fitter.base, fitter.root, known, way.alone)
     waves = way.waves if part is None else None
-    search.asks_drift = waves is None
-    plain = None if waves is None else in_plain_waves(search, waves)
-    # What waves and a few effects explain needs no dozen effects without waves.
-    search.is_for_few = plain is not None and plain.left.is_nothing
+    search.asks_drift, search.is_second = waves is None, is_second
+    plain = None if waves is None else _PlainWaves(search, waves)
+    if plain is not None:
+        search.instead = plain.leave_nothing
     again = [fitter.refitted(one) for one in _found_in(part)] if part else _alike(fitter, like)
     best = search.run(again)
     drift = None if search.adrift is None else in_drift(search, search.adrift)
@@ -56,17 +61,16 @@ def explain(
     if search.adrift is not None:
         search = Search(fitter, workers, on_progress, fitter.base, fitter.root, alone=search.alone_so_far())
         best = search.run(again)
-    left, told = leftover(fitter, best), None
-    if waves is not None and plain is not None:
-        plain = against(plain, waves, best)
+    left, told, calm = leftover(fitter, best), None, best
     may_be_sea = part is None or part.best.fit.has_process_noise
     is_astray = may_be_sea and not (left.is_nothing or best.fit.has_process_noise)
     if is_astray and (led := led_astray(search, best)) is not None:
         left_then = leftover(fitter, led[1])
         if search.follows_no_free_run or left_then.is_nothing:
             return Explained(led[1], led[0], left_then, None)
-    if plain is not None and plain.left.is_nothing and not left.is_nothing:
-        return plain
+    swung = None if plain is None or left.is_nothing else plain.instead_of(calm)
+    if swung is not None and swung.left.is_nothing:
+        return swung
     # Where no free run comes near, none tells a form of unknown physics from another.
     if not search.is_pushed_about and (best.names or not left.is_nothing):
         grown = with_unknown(search, best)
@@ -74,12 +78,13 @@ def explain(
             grown = told_by_the_usual(search, grown)  # what joined late has not been asked yet
         best, left = grown, leftover(fitter, grown)
     if may_be_sea and (unknown_in(best) or not left.is_nothing):
+        swung = None if plain is None else plain.instead_of(calm)
+        if swung is not None and swung.left.is_nothing:
+            return swung
         calm = best
-        if plain is not None and plain.left.is_nothing:
-            return plain
         search, best = in_a_sea(search, best)
-        if plain is not None and explains_more(plain, best):
-            return plain
+        if swung is not None and explains_more(swung, best):
+            return swung
         if part is None or part.waves is not None:
             search, best, told = among_waves(search, best, calm)
         left = leftover(fitter, best if told is None else told.fitted)
@@ -90,6 +95,25 @@ def explain(
     if told is None and (lean := leanest(search, best)) is not best:
         best, left = lean, leftover(fitter, lean)
     return Explained(best, search, left, told)
+
+
+class _PlainWaves:
+    """The search among waves that were plain to see, which takes long: begun when it is first asked for."""
+
+    def __init__(self, calm: Search, waves: Explanation) -> None:
+        self._calm, self._waves = calm, waves
+
+    @cached_property
+    def _found(self) -> Explained:
+        return in_plain_waves(self._calm, self._waves)
+
+    def leave_nothing(self) -> bool:
+        """Whether waves and a few effects explain it all: then it needs no dozen effects without waves."""
+        return self._found.left.is_nothing
+
+    def instead_of(self, best: Explanation) -> Explained | None:
+        """What was found among them, where they alone explain more than the best set without them."""
+        return against(self._found, self._waves, best)
 
 
 def _alike(fitter: Fitter, like: Explanation | None) -> list[Explanation]:

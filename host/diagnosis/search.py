@@ -27,7 +27,7 @@ from host.diagnosis.offset_choice import with_best_offsets, with_likeliest_offse
 from host.diagnosis.prospects import gain
 from host.diagnosis.pruning import pruned
 from host.diagnosis.rarity import told_by_the_usual
-from host.diagnosis.together import completed, together, with_more
+from host.diagnosis.together import at_once, completed, together, with_more
 from host.diagnosis.whole_vehicle import whole, with_all_ordinary
 from host.diagnosis.workers import Task, Workers
 from host.recording import Array
@@ -39,6 +39,7 @@ PROMISING = 6
 CONTENDERS = 3  # for the place of the leading set
 MOST_ROUNDS = 4
 LOST = 10.0  # times the noise floor: forces as slight as this leave no stable hull so far away
+FAR_LESS = 0.5  # of what a dozen effects leave: two that come so near are the way to go on
 FAR_LIKELIER = 2.0  # of BIC a sample: what no few effects more make up for
 
 Progress = Callable[[str], None]
@@ -57,7 +58,8 @@ class Search:
     steered  what a continuation found likeliest while forces still steered the state; `at_sea` the same
              among those that are likeliest beside it, once asked
     asks_drift  whether something may drift beside white noise; `adrift` a set beside that, where it is plain
-    is_for_few  not for all that every vehicle has at once: something else explains the recordings
+    is_second  it was all searched with the plane the other way, too, where no continuation helped
+    instead  whether something else explains the recordings: then not all that every vehicle has is tried
     """
 
     fitter: Fitter
@@ -72,7 +74,8 @@ class Search:
     joint: set[Names] = field(default_factory=set)
     steered: Explanation | None = None
     at_sea: Explanation | None = None
-    is_for_few: bool = False
+    is_second: bool = False
+    instead: Callable[[], bool] = lambda: False
     asks_drift: bool = False
     adrift: Explanation | None = None
     _shrunk: dict[Names, set[Names]] = field(default_factory=dict)  # those fitted from larger sets: which
@@ -89,13 +92,17 @@ class Search:
             settled = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
             found = self._settled(min(settled, key=lambda e: e.bic))
             return found if self.part is not None else told_by_the_usual(self, whole(self, found))
-        foreign, leading, enough = None, self.root, None
+        foreign, leading, enough, postponed = None, self.root, None, None
         for size in range(1, LARGEST_SET + 1):
             if size == 2 and self._needs_many(beam[0], size):
                 beam = self._with_best_pair(beam)
-            is_time = foreign is None and self._needs_many(beam[0], size)
-            if is_time and (together(self, beam[0]) is not None or self.is_led_elsewhere):
-                break
+            if foreign is None and self._needs_many(beam[0], size):
+                joint = at_once(self, beam[0])
+                pair = self._pair_instead(beam[0], joint) if size == 2 else None
+                if pair is not None:
+                    beam, postponed = [pair], joint
+                elif together(self, beam[0], joint) is not None or self.is_led_elsewhere:
+                    break
             grown = self.singles() if size == 1 else self._grown(beam, size)
             best_before = min(e.bic for e in beam)
             beam = self._parents(grown)[: BEAM if size == 1 else NARROW]
@@ -114,6 +121,8 @@ class Search:
                 foreign = lone_form(self, leading)
                 if foreign is not None and self._is_only_flexible(foreign, leading):
                     break
+        if postponed is not None and self.fitter.excess(self._likeliest.fit) > LITTLE:
+            together(self, leading, postponed)
         if self.is_led_elsewhere:
             return min((e for e in self.tried.values() if FREE_TRIM.name not in e.names), key=lambda e: e.bic)
         return self._concluded()
@@ -250,9 +259,9 @@ class Search:
 
     def _needs_many(self, leading: Explanation, size: int) -> bool:
         """Whether it is time, once, to try all that every vehicle has: far too much is left, or too much."""
-        if size == 1 or self.joint or self.is_for_few or self.root.fit.has_process_noise:
+        if size == 1 or self.joint or self.root.fit.has_process_noise:
             return False
-        return self.fitter.excess(leading.fit) > (MUCH if size <= SMALL else LITTLE)
+        return self.fitter.excess(leading.fit) > (MUCH if size <= SMALL else LITTLE) and not self.instead()
 
     def _with_best_pair(self, singles: list[Explanation]) -> list[Explanation]:
         """The sets led by the likeliest pair of the first and another of them, if that leaves less than much.
@@ -265,6 +274,13 @@ class Search:
         best = min(pairs, key=lambda e: e.bic, default=first)
         return [best, *singles] if self.fitter.excess(best.fit) < MUCH else singles
 
+    def _pair_instead(self, leading: Explanation, joint: Explanation) -> Explanation | None:
+        """The likeliest set of the leading one and one effect, where that leaves far less than a dozen do."""
+        if self.fitter.excess(joint.fit) < LITTLE:
+            return None
+        pair = min(self._grown([leading], 2), key=lambda e: e.bic, default=leading)
+        return pair if self.fitter.excess(pair.fit) < FAR_LESS * self.fitter.excess(joint.fit) else None
+
     def _most_without_form(self, leading: Explanation) -> int | None:
         """So many effects need no look at forms of unknown physics, more do; None among forces.
 
@@ -276,7 +292,12 @@ class Search:
 
     def _is_only_flexible(self, foreign: Explanation, leading: Explanation) -> bool:
         """Whether what wanders with time only stands for what every vehicle has, which moves as slowly."""
-        joint = together(self, leading) if foreign.names & WANDERING else None
+        if not foreign.names & WANDERING:
+            return False
+        begun = at_once(self, leading)
+        if self._pair_instead(leading, begun) is not None:
+            return False
+        joint = together(self, leading, begun)
         return joint is not None and joint.bic < foreign.bic
 
     def _parents(self, grown: list[Explanation]) -> list[Explanation]:
@@ -347,6 +368,10 @@ class Search:
         return best
 
     @property
+    def _likeliest(self) -> Explanation:
+        return min(self.tried.values(), key=lambda e: e.bic)
+
+    @property
     def follows_no_free_run(self) -> bool:
         """Whether slight forces let the equations follow a vehicle that they lose without: it is unstable."""
         return self.steered is not None and self._is_lost and self.fitter.are_slight(self.steered.fit.noise)
@@ -359,8 +384,7 @@ class Search:
         """
         if self.steered is None or not self._is_lost:
             return False
-        least = min(one.bic for one in self.tried.values())
-        return self.steered.bic < least - FAR_LIKELIER * self.steered.fit.samples
+        return self.steered.bic < self._likeliest.bic - FAR_LIKELIER * self.steered.fit.samples
 
     @property
     def _is_lost(self) -> bool:

@@ -31,23 +31,32 @@ MOST_BESIDE = 3  # effects beside those that every vehicle has
 HARDLY_LESS = 0.95  # of what is left over the noise floor: another effect beside so many leads nowhere
 
 
-def together(search: "Search", leading: Explanation) -> Explanation | None:
+def at_once(search: "Search", leading: Explanation) -> Explanation:
+    """The leading set with all that every vehicle has, and what else promises most where little is left."""
+    search.on_progress("what every vehicle has")
+    fitter, best = search.fitter, _with_few_more(search, with_ordinary(search, leading))
+    if fitter.excess(best.fit) > LITTLE and (alike := _among_look_alikes(search, best)) is not best:
+        best = _with_few_more(search, alike)
+    return best
+
+
+def together(search: "Search", leading: Explanation, joint: Explanation) -> Explanation | None:
     """The leading set with all that every vehicle has, more if need be, pruned; None if too much is left.
 
     Where it has led astray, all that every vehicle has by continuation, which needs no set to begin with, but
     takes longest. Where that leaves more than a little, but a fraction of what the leading set does, it stays
     as it is: a few effects more come nowhere near.
+
+    joint  what `at_once` made of the leading set
     """
-    search.on_progress("what every vehicle has")
-    fitter, best = search.fitter, _with_few_more(search, with_ordinary(search, leading))
-    if fitter.excess(best.fit) > LITTLE and (alike := _among_look_alikes(search, best)) is not best:
-        best = _with_few_more(search, alike)
+    fitter, best = search.fitter, joint
     if search.asks_drift and fitter.excess(best.fit) > LITTLE:
         search.on_progress("sensors that wander, gusts")
         search.adrift = plain_drift(fitter, best)
         if search.adrift is not None:
             return None
-    if fitter.excess(best.fit) > LITTLE and (end := _by_continuation(search)) is not None:
+    may_be_led = fitter.excess(best.fit) < MUCH or not search.is_second
+    if fitter.excess(best.fit) > LITTLE and may_be_led and (end := _by_continuation(search)) is not None:
         best = with_more(search, min(end, best, key=lambda e: e.bic))
     if fitter.excess(best.fit) > LITTLE and is_above_floor(fitter, best.fit):
         is_out_of_reach = fitter.excess(best.fit) < MUCH and is_far(fitter, leading)

@@ -47,12 +47,20 @@ RARE_SET = explanation(frozenset({"munk_moment", "actuator_delay"}))
 IN_WAVES = Explained(cast("Any", explanation(frozenset())), cast("Any", None), cast("Any", NOTHING), None)
 
 
-def explained(monkeypatch: pytest.MonkeyPatch, found: Any, *, left: Any = NOTHING, waves: Any = None) -> Any:
-    """What `explain` makes of a search that finds this, and whether that was for few effects only."""
+def explained(
+    monkeypatch: pytest.MonkeyPatch,
+    found: Any,
+    *,
+    left: Any = NOTHING,
+    waves: Any = None,
+    needs_many: bool = False,
+) -> Any:
+    """What `explain` makes of a search that finds this, and whether that was for few effects, if it asked."""
     was_for_few = []
 
     def run(search: Search, _: Any) -> Any:
-        was_for_few.append(search.is_for_few)
+        if needs_many:
+            was_for_few.append(search.instead())
         return found
 
     monkeypatch.setattr(Search, "run", run)
@@ -79,15 +87,22 @@ def test_a_rare_effect_that_joins_late_is_asked_unless_a_form_competes(
     assert answer.best is (ORDINARY_SET if asked else late)
 
 
-@pytest.mark.parametrize(("left", "is_in_waves"), [(NOTHING, False), (MUCH_LEFT, True)])
-def test_waves_that_are_plain_to_see_are_asked_first(
-    left: Any, is_in_waves: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("left", "needs_many", "searches", "is_in_waves"),
+    [(NOTHING, False, 0, False), (NOTHING, True, 1, False), (MUCH_LEFT, False, 1, True)],
+    ids=["explained by few", "in place of a dozen", "not explained"],
+)
+def test_waves_that_are_plain_to_see_are_searched_once_where_they_matter(
+    left: Any, needs_many: bool, searches: int, is_in_waves: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "in_plain_waves", lambda *_: IN_WAVES)
+    begun = []
+    monkeypatch.setattr(module, "in_plain_waves", lambda *_: begun.append(1) or IN_WAVES)
     monkeypatch.setattr(module, "against", lambda plain, *_: plain)
     monkeypatch.setattr(module, "with_unknown", lambda _, best: best)
-    answer, was_for_few = explained(monkeypatch, ORDINARY_SET, left=left, waves=explanation(frozenset()))
-    assert was_for_few == [True]
+    waves = explanation(frozenset())
+    answer, was_for_few = explained(monkeypatch, ORDINARY_SET, left=left, waves=waves, needs_many=needs_many)
+    assert was_for_few == [True] * needs_many
+    assert len(begun) == searches
     assert (answer is IN_WAVES) is is_in_waves
 
 
@@ -95,7 +110,7 @@ def test_waves_that_are_plain_to_see_are_asked_first(
 def test_what_a_few_explain_needs_no_dozen(is_for_few: bool) -> None:
     one: Any = explanation(frozenset())
     search = Search(
-        fitter_that_leaves(3.0), cast("Any", None), lambda _: None, one, one, is_for_few=is_for_few
+        fitter_that_leaves(3.0), cast("Any", None), lambda _: None, one, one, instead=lambda: is_for_few
     )
     assert search._needs_many(one, 2) is not is_for_few
 

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from itertools import combinations
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ from host.diagnosis.margins import LITTLE
 from host.diagnosis.offset_choice import with_offset
 from host.diagnosis.pruning import leanest, pruned
 from host.diagnosis.search import Search
-from host.diagnosis.together import completed, together, with_ordinary
+from host.diagnosis.together import at_once, completed, together, with_ordinary
 from host.diagnosis.unknown_physics import with_unknown
 from host.diagnosis.workers import Task, Workers
 from host.gauss_newton import Point
@@ -160,7 +162,7 @@ def test_what_runs_away_joins_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         lost = {"speed_loss"}
         assert with_ordinary(search, fitter.base).names == {*ORDINARY, "plane_before"} - lost
         lost = {effect.name for effect in CATALOGUE}
-        assert together(search, fitter.base) is None
+        assert together(search, fitter.base, at_once(search, fitter.base)) is None
 
 
 def test_a_member_that_does_not_pay_after_all_is_dropped_at_last() -> None:
@@ -287,3 +289,18 @@ def test_one_form_competes_with_one_effect_that_leaves_much_or_three(
         found = Search(fitter, workers, lambda _: None, fitter.base, root).run()
     assert asked == ([] if asked_after is None else [asked_after])
     assert found.names - root.names == ({*names} if asked_after is None else {"unknown_moment_q_q"})
+
+
+@pytest.mark.parametrize(("left", "is_pair"), [(1.5, True), (3.0, False)])
+def test_two_that_leave_far_less_than_a_dozen_are_gone_on_with(
+    left: float, is_pair: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pair = SimpleNamespace(fit=left, bic=-2.0)
+    joint: Any = SimpleNamespace(fit=4.0)
+    monkeypatch.setattr(Search, "_grown", lambda *_: [SimpleNamespace(fit=9.0, bic=-1.0), pair])
+    fitter: Any = SimpleNamespace(excess=lambda fit: fit)
+    one: Any = SimpleNamespace(fit=5.0, bic=0.0)
+    search = Search(fitter, cast("Any", None), lambda _: None, one, one)
+    assert (search._pair_instead(one, joint) is pair) is is_pair
+    nothing_left: Any = SimpleNamespace(fit=1.0)
+    assert search._pair_instead(one, nothing_left) is None

@@ -12,7 +12,7 @@ from host.catalogue import structure_of
 from host.diagnosis import together as module
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.search import Search
-from host.diagnosis.together import completed, together
+from host.diagnosis.together import at_once, completed, together
 from host.diagnosis.workers import Workers
 from host.gauss_newton import Point
 from host.output_error import output_error
@@ -38,7 +38,7 @@ class Rounds:
         self.workers = SimpleNamespace(results=self._next)
         self.leading = SimpleNamespace(names=frozenset({0}), fit=20.0, bic=0.0)
         self.continued = 0
-        self.asks_drift, self.adrift = False, None
+        self.asks_drift, self.adrift, self.is_second = False, None, False
         patch.setattr(module, "with_ordinary", lambda search, _: search.sets[0])
         patch.setattr(module, "_among_look_alikes", lambda _, best: best)
         patch.setattr(module, "_by_continuation", Rounds._continued)
@@ -63,13 +63,25 @@ class Rounds:
 
 
 def found(search: Rounds) -> Any:
-    return together(search, search.leading)  # type: ignore[arg-type]
+    joint = at_once(search, search.leading)  # type: ignore[arg-type]
+    return together(search, search.leading, joint)  # type: ignore[arg-type]
 
 
 def test_another_effect_that_takes_hardly_anything_away_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
     search = Rounds([10.4, 10.1, 9.9, 9.8], True, monkeypatch)
     assert found(search) is None
     assert search.rounds == 1
+
+
+@pytest.mark.parametrize(("left", "continued"), [(10.4, 0), (1.5, 1)])
+def test_with_the_plane_the_other_way_no_continuation_leads_far(
+    left: float, continued: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "is_far", lambda *_: True)
+    search = Rounds([left, left, left, left], True, monkeypatch)
+    search.is_second = True
+    found(search)
+    assert search.continued == continued
 
 
 def test_as_long_as_less_is_left_more_join(monkeypatch: pytest.MonkeyPatch) -> None:

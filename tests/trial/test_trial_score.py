@@ -110,6 +110,13 @@ def test_tables_page_and_file_say_the_same(tmp_path: Path) -> None:
     assert "http" not in page.replace("http-equiv", "")
 
 
+def test_a_row_of_the_matrix_holds_names_that_were_never_hidden(tmp_path: Path) -> None:
+    judged = [judge(answer(), recorded(), diagnosis(effect("heave_pitch_acceleration_coupling")))]
+    write_page(tmp_path / "trial.html", 7, "abc", score(judged), judged, [], [])
+    page = (tmp_path / "trial.html").read_text()
+    assert "trim_moment named heave_pitch_acceleration_coupling: 1" in page
+
+
 def test_a_trial_without_recordings_has_no_figures() -> None:
     result = score([])
     assert result.recordings == 0
