@@ -27,6 +27,7 @@ from host.diagnosis.seas import (
 )
 from host.diagnosis.unknown_physics import unknown_in, with_unknown
 from host.diagnosis.workers import Workers
+from host.stability import is_stable
 
 
 def explain(
@@ -66,7 +67,8 @@ def explain(
     is_astray = may_be_sea and not (left.is_nothing or best.fit.has_process_noise)
     if is_astray and (led := led_astray(search, best)) is not None:
         left_then = leftover(fitter, led[1])
-        if search.follows_no_free_run or left_then.is_nothing:
+        is_led = search.follows_no_free_run or left_then.is_nothing
+        if is_led and not _does_a_form_more(search, best, led[1]):
             return Explained(led[1], led[0], left_then, None)
     swung = None if plain is None or left.is_nothing else plain.instead_of(calm)
     if swung is not None and swung.left.is_nothing:
@@ -114,6 +116,18 @@ class _PlainWaves:
     def instead_of(self, best: Explanation) -> Explained | None:
         """What was found among them, where they alone explain more than the best set without them."""
         return against(self._found, self._waves, best)
+
+
+def _does_a_form_more(search: Search, best: Explanation, led: Explanation) -> bool:
+    """Whether forms of unknown physics are likelier than forces that may be errors of the measured speed.
+
+    What wanders in a vehicle leads a free run away as well, and such forces follow it; from a hull that does
+    not hold its course by itself it cannot be told.
+    """
+    if not is_stable(led.fit):
+        return False
+    grown = with_unknown(search, best)
+    return bool(unknown_in(grown)) and as_filtered(search.fitter, grown).bic < led.bic - NAMING_MARGIN
 
 
 def _alike(fitter: Fitter, like: Explanation | None) -> list[Explanation]:

@@ -1,5 +1,6 @@
 """In which order a diagnosis asks: with what it begins, waves that are plain to see, what joined late."""
 
+from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -53,6 +54,7 @@ def explained(
     *,
     left: Any = NOTHING,
     waves: Any = None,
+    led: Any = None,
     needs_many: bool = False,
 ) -> Any:
     """What `explain` makes of a search that finds this, and whether that was for few effects, if it asked."""
@@ -64,8 +66,8 @@ def explained(
         return found
 
     monkeypatch.setattr(Search, "run", run)
-    monkeypatch.setattr(module, "leftover", lambda *_: left)
-    monkeypatch.setattr(module, "led_astray", lambda *_: None)
+    monkeypatch.setattr(module, "leftover", lambda *_: next(left) if isinstance(left, Iterator) else left)
+    monkeypatch.setattr(module, "led_astray", lambda *_: led)
     monkeypatch.setattr(module, "unknown_in", lambda one: [n for n in one.names if n.startswith("unknown_")])
     monkeypatch.setattr(module, "leanest", lambda _, best: best)
     fitter: Any = SimpleNamespace(base=None, root=None)
@@ -128,3 +130,31 @@ def test_no_form_of_unknown_physics_is_asked_where_no_free_run_comes_near(
     answer, _ = explained(monkeypatch, ORDINARY_SET, left=MUCH_LEFT)
     assert answer.best is RARE_SET
     assert asked == ([] if is_pushed else [ORDINARY_SET])
+
+
+@pytest.mark.parametrize(
+    ("is_stable", "name", "bic", "is_led"),
+    [
+        (True, "unknown_wandering_moment", -90.0, False),
+        (True, "unknown_wandering_moment", -70.0, True),
+        (True, "munk_moment", -90.0, True),
+        (False, "unknown_wandering_moment", -90.0, True),
+    ],
+    ids=["likelier", "less likely", "no form", "an unstable hull"],
+)
+def test_what_wanders_is_not_excused_by_errors_of_the_speed(
+    is_stable: bool, name: str, bic: float, is_led: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    by_speed, form = explanation(frozenset({"trim_moment"})), explanation(frozenset({name}))
+    by_speed.bic, form.bic = -80.0, bic
+    monkeypatch.setattr(module, "is_stable", lambda _: is_stable)
+    monkeypatch.setattr(module, "with_unknown", lambda *_: form)
+    monkeypatch.setattr(module, "as_filtered", lambda _, one: one)
+    monkeypatch.setattr(module, "told_by_the_usual", lambda _, one: one)
+    monkeypatch.setattr(module, "in_a_sea", lambda search, best: (search, best))
+    monkeypatch.setattr(module, "among_waves", lambda search, best, _: (search, best, None))
+    monkeypatch.setattr(module, "among_drift", lambda *_: None)
+    lefts = iter([MUCH_LEFT, NOTHING, *[NOTHING] * 9])
+    monkeypatch.setattr(Search, "is_pushed_about", False)
+    answer, _ = explained(monkeypatch, ORDINARY_SET, left=lefts, led=("at sea", by_speed))
+    assert (answer.best is by_speed) is is_led

@@ -221,18 +221,21 @@ def test_what_explains_most_alone_may_speak_against_the_base(monkeypatch: pytest
 def test_what_is_found_may_speak_against_the_first_choice(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("host.diagnosis.diagnose.ways", lambda recordings: ways(recordings)[::-1])
     monkeypatch.setattr("host.diagnosis.diagnose.by_single_effects", lambda found, *_: found)
-    begun: list[Explanation | None] = []
+    begun: list[tuple[Explanation | None, bool]] = []
     found_so: list[Explanation] = []
 
-    def explain_and_note(*args: Any, like: Explanation | None) -> Explained:
-        begun.append(like)
-        explained = explain(*args, like=like)
+    def explain_and_note(*args: Any, like: Explanation | None, is_second: bool) -> Explained:
+        begun.append((like, is_second))
+        explained = explain(*args, like=like, is_second=is_second)
         found_so.append(explained.best)
         return explained
 
     monkeypatch.setattr("host.diagnosis.diagnose.explain", explain_and_note)
     found = diagnose([dive("moving")])
-    assert begun == [None, found_so[0]]  # what was found with the plane the wrong way is begun with
+    assert begun == [
+        (None, False),
+        (found_so[0], True),
+    ]  # what was found with the plane the wrong way is begun with
     assert found.ranking
     assert found.verdict == "no_mismatch"
     assert NOTE in found.recordings[0].notes

@@ -82,6 +82,7 @@ def test_a_correction_is_no_physics_and_is_not_named() -> None:
     assert known_in(corrected) == ["speed_loss"]
 
 
+@pytest.mark.long
 def test_it_is_told_and_kept_in_the_model_which_lacks_nothing(tmp_path: Path) -> None:
     found = diagnose([slowing(0.1)])
     assert found.verdict == "explained"

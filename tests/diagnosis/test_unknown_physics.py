@@ -24,6 +24,7 @@ from host.predict import predict
 from host.vehicle import vehicle_from_table
 
 
+@pytest.mark.long
 def test_drag_on_one_side_of_the_keel_is_none_of_the_catalogue() -> None:
     """Quadratic drag with a current and a buoyancy that cancel would follow it nearly to the noise."""
 
