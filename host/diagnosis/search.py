@@ -1,12 +1,10 @@
 """Which set of effects explains the recording: a beam search over sets, each refitted jointly.
 
-Effects are never added one at a time for good: sets are carried side by side, every member of a set is
-re-estimated with the base whenever one joins, members that no longer pay are dropped, and each member of the
-best set is exchanged for every other effect that might do its work. Each effect is fitted alone; what it
-could gain beside others is predicted by one Gauss-Newton step from there, and the promising ones are fitted.
-Where one effect leaves much, or many were needed, what every vehicle has is fitted together and pruned
-(host.diagnosis.together), unless one form of unknown physics leaves less (host.diagnosis.lone_form); one
-that wanders with time must do better than they do.
+Effects are never added one at a time for good: sets are carried side by side (host.diagnosis.beam), every
+member of a set is re-estimated with the base whenever one joins, members that no longer pay are dropped, and
+each member of the best set is exchanged for every other effect that might do its work. Each effect is fitted
+alone; what it could gain beside others is predicted by one Gauss-Newton step from there, and the promising
+ones are fitted.
 """
 
 from collections.abc import Callable, Iterable
@@ -16,30 +14,23 @@ from math import inf
 from host.catalogue import named
 from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM
-from host.catalogue.unknown import WANDERING
 from host.diagnosis.absence import promises_more
+from host.diagnosis.beam import beam_search, grown
 from host.diagnosis.exchange import exchanged, twins
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.lone_form import lone_form
-from host.diagnosis.margins import FEW, LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN, ROUGH, SMALL, margin
-from host.diagnosis.offset_choice import with_best_offsets, with_likeliest_offsets, with_offset
+from host.diagnosis.margins import LARGEST_SET, MUCH, ROUGH, SMALL
+from host.diagnosis.offset_choice import with_best_offsets, with_likeliest_offsets
 from host.diagnosis.prospects import gain
 from host.diagnosis.pruning import pruned
 from host.diagnosis.rarity import told_by_the_usual
-from host.diagnosis.together import at_once, completed, together, with_more
+from host.diagnosis.together import completed, with_more
 from host.diagnosis.whole_vehicle import whole, with_all_ordinary
 from host.diagnosis.workers import Task, Workers
 from host.recording import Array
 
-BEAM = 4  # single effects carried on
-FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
-NARROW = 2  # of larger sets, which cost most and of which there are most
-PROMISING = 6
-CONTENDERS = 3  # for the place of the leading set
 MOST_ROUNDS = 4
 LOST = 10.0  # times the noise floor: forces as slight as this leave no stable hull so far away
-FAR_LESS = 0.5  # of what a dozen effects leave: two that come so near are the way to go on
 FAR_LIKELIER = 2.0  # of BIC a sample: what no few effects more make up for
 
 Progress = Callable[[str], None]
@@ -86,43 +77,13 @@ class Search:
         """The best explanation all of whose members pay for themselves; `also` are sets worth a look."""
         for explanation in (self.base, *(also or [])):
             self.remember(explanation)
-        beam = [self.remember(self.root)]
+        self.remember(self.root)
         if self.part is not None or any(len(e.names) > LARGEST_SET for e in also or []):
             self.on_progress("settling")
             settled = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
             found = self._settled(min(settled, key=lambda e: e.bic))
             return found if self.part is not None else told_by_the_usual(self, whole(self, found))
-        foreign, leading, enough, postponed = None, self.root, None, None
-        for size in range(1, LARGEST_SET + 1):
-            if size == 2 and self._needs_many(beam[0], size):
-                beam = self._with_best_pair(beam)
-            if foreign is None and self._needs_many(beam[0], size):
-                joint = at_once(self, beam[0])
-                pair = self._pair_instead(beam[0], joint) if size == 2 else None
-                if pair is not None:
-                    beam, postponed = [pair], joint
-                elif together(self, beam[0], joint) is not None or self.is_led_elsewhere:
-                    break
-            grown = self.singles() if size == 1 else self._grown(beam, size)
-            best_before = min(e.bic for e in beam)
-            beam = self._parents(grown)[: BEAM if size == 1 else NARROW]
-            if size == 1 and beam and self.fitter.excess(beam[0].fit) > LITTLE:
-                beam = [*with_offset(self, beam[:NARROW]), *beam[NARROW:]][:BEAM]
-            if beam and beam[0].leaves_white and self.fitter.excess(beam[0].fit) < LITTLE:
-                del beam[1:]  # whatever grows from the others is not likelier
-            if foreign is not None and (not beam or foreign.bic < beam[0].bic - margin(foreign)):
-                self.remember(foreign)  # no pair of the catalogue does as well
-                break
-            if not beam or beam[0].bic > best_before - margin(beam[0]):
-                break
-            if size == 1:
-                leading, enough = beam[0], self._most_without_form(beam[0])
-            if size == enough:
-                foreign = lone_form(self, leading)
-                if foreign is not None and self._is_only_flexible(foreign, leading):
-                    break
-        if postponed is not None and self.fitter.excess(self._likeliest.fit) > LITTLE:
-            together(self, leading, postponed)
+        beam_search(self)
         if self.is_led_elsewhere:
             return min((e for e in self.tried.values() if FREE_TRIM.name not in e.names), key=lambda e: e.bic)
         return self._concluded()
@@ -153,7 +114,7 @@ class Search:
         """Each effect alone on top of the root."""
         if self.alone:
             return [self.remember(explanation) for explanation in self.alone]
-        return self._grown([self.remember(self.root)], 1)
+        return grown(self, [self.remember(self.root)], 1)
 
     def alone_so_far(self) -> tuple[Explanation, ...]:
         """Each effect alone on top of the root, as far as these were fitted."""
@@ -257,88 +218,6 @@ class Search:
         """Each in its likeliest valley."""
         return [self.remember(e) for e in self.workers.results([(Fitter.across, (e,)) for e in explanations])]
 
-    def _needs_many(self, leading: Explanation, size: int) -> bool:
-        """Whether it is time, once, to try all that every vehicle has: far too much is left, or too much."""
-        if size == 1 or self.joint or self.root.fit.has_process_noise:
-            return False
-        return self.fitter.excess(leading.fit) > (MUCH if size <= SMALL else LITTLE) and not self.instead()
-
-    def _with_best_pair(self, singles: list[Explanation]) -> list[Explanation]:
-        """The sets led by the likeliest pair of the first and another of them, if that leaves less than much.
-
-        Two that each explain much may be all that acts: then a dozen need not join.
-        """
-        first, *others = singles
-        names = [name for one in others for name in one.names - first.names]
-        pairs = [self.remember(e) for e in self.workers.results([self.growth(first, n) for n in names])]
-        best = min(pairs, key=lambda e: e.bic, default=first)
-        return [best, *singles] if self.fitter.excess(best.fit) < MUCH else singles
-
-    def _pair_instead(self, leading: Explanation, joint: Explanation) -> Explanation | None:
-        """The likeliest set of the leading one and one effect, where that leaves far less than a dozen do."""
-        if self.fitter.excess(joint.fit) < LITTLE:
-            return None
-        pair = min(self._grown([leading], 2), key=lambda e: e.bic, default=leading)
-        return pair if self.fitter.excess(pair.fit) < FAR_LESS * self.fitter.excess(joint.fit) else None
-
-    def _most_without_form(self, leading: Explanation) -> int | None:
-        """So many effects need no look at forms of unknown physics, more do; None among forces.
-
-        Of one that leaves much, one form may do the work at once.
-        """
-        if self.root.fit.has_process_noise:
-            return None
-        return 1 if self.fitter.excess(leading.fit) > LITTLE else SMALL
-
-    def _is_only_flexible(self, foreign: Explanation, leading: Explanation) -> bool:
-        """Whether what wanders with time only stands for what every vehicle has, which moves as slowly."""
-        if not foreign.names & WANDERING:
-            return False
-        begun = at_once(self, leading)
-        if self._pair_instead(leading, begun) is not None:
-            return False
-        joint = together(self, leading, begun)
-        return joint is not None and joint.bic < foreign.bic
-
-    def _parents(self, grown: list[Explanation]) -> list[Explanation]:
-        """The best sets, as far as they explain a fair part of what the very best does."""
-        ordered = sorted(grown, key=lambda e: e.bic)[:BEAM]
-        gains = [self.root.bic - e.bic for e in ordered]
-        return [e for e, gain in zip(ordered, gains, strict=True) if gain > FAIR_PART * gains[0]]
-
-    def _grown(self, parents: list[Explanation], size: int) -> list[Explanation]:
-        tasks: dict[Names, Task] = {}
-        for parent in parents:
-            for name in self._promising(parent, size, parent is parents[0]):
-                tasks.setdefault(parent.names | {name}, self.growth(parent, name))
-        sets = list(tasks)
-
-        def say(number: int) -> None:
-            names = sets[number]
-            count, label = len(names - {FREE_TRIM.name}), " + ".join(sorted(names))
-            self.on_progress(f"{count} effect{'s' * (count > 1)}, {number + 1}/{len(sets)}: {label}")
-
-        found = self.workers.results(list(tasks.values()), say)
-        return [self.remember(explanation) for explanation in found]
-
-    def _promising(self, parent: Explanation, size: int, is_leading: bool) -> list[str]:
-        """Effects to fit in earnest: all at first, later those predicted to gain most.
-
-        The prediction is local. A base bent far from the truth hides what the common effects, which trade
-        against its own coefficients, would gain once all of them are free; so until little is left these
-        are always tried, unless all at once.
-        """
-        others = self.candidates(parent)
-        if size == 1 and not self.root.fit.has_process_noise:
-            return others
-        gains = self.gains(parent, is_leading)
-        best = sorted(gains, key=lambda name: -gains[name])[: PROMISING if size == 2 else FEW]
-        worth = {name for name in best if gains[name] > NAMING_MARGIN}
-        is_far = size <= 2 and self.fitter.excess(parent.fit) > LITTLE
-        # What every vehicle has was tried at once and leads nowhere, if it was.
-        is_far &= not self.root.fit.has_process_noise and not self.joint
-        return [name for name in others if name in worth or (is_far and named(name).is_common)]
-
     def values(self, name: str) -> list[Array]:
         """Where a fit of this effect alone ended: a better start than its probes."""
         alone = self._alone(name)
@@ -368,7 +247,8 @@ class Search:
         return best
 
     @property
-    def _likeliest(self) -> Explanation:
+    def likeliest(self) -> Explanation:
+        """Of all that was tried, a free trim in it or not."""
         return min(self.tried.values(), key=lambda e: e.bic)
 
     @property
@@ -384,7 +264,7 @@ class Search:
         """
         if self.steered is None or not self._is_lost:
             return False
-        return self.steered.bic < self._likeliest.bic - FAR_LIKELIER * self.steered.fit.samples
+        return self.steered.bic < self.likeliest.bic - FAR_LIKELIER * self.steered.fit.samples
 
     @property
     def _is_lost(self) -> bool:

@@ -7,6 +7,7 @@ from typing import Any, cast
 import pytest
 
 from host.diagnosis import explain as module
+from host.diagnosis.beam import _needs_many
 from host.diagnosis.explain import _alike
 from host.diagnosis.margins import LARGEST_SET, LITTLE
 from host.diagnosis.search import Search
@@ -114,7 +115,7 @@ def test_what_a_few_explain_needs_no_dozen(is_for_few: bool) -> None:
     search = Search(
         fitter_that_leaves(3.0), cast("Any", None), lambda _: None, one, one, instead=lambda: is_for_few
     )
-    assert search._needs_many(one, 2) is not is_for_few
+    assert _needs_many(search, one, 2) is not is_for_few
 
 
 @pytest.mark.parametrize("is_pushed", [False, True])

@@ -10,7 +10,9 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import CATALOGUE, ORDINARY, structure_of
+from host.diagnosis import beam
 from host.diagnosis import search as module
+from host.diagnosis.beam import _pair_instead, _with_best_pair
 from host.diagnosis.charges import LONELY, RARITY
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
@@ -251,7 +253,7 @@ def test_two_that_explain_much_each_are_asked_before_a_dozen(
 
     monkeypatch.setattr(workers, "results", results)
     monkeypatch.setattr(Fitter, "excess", lambda *_: left)
-    leading = search._with_best_pair(singles)
+    leading = _with_best_pair(search, singles)
     assert grown == names[1:]
     assert leading[-3:] == singles
     assert ({"internal_wave", "actuator_rate_limit"} <= leading[0].names) is is_kept
@@ -279,12 +281,13 @@ def test_one_form_competes_with_one_effect_that_leaves_much_or_three(
         return replace(root, names=root.names | {"unknown_moment_q_q"}, bic=root.bic - 1000.0)
 
     asked: list[int] = []
-    monkeypatch.setattr(Search, "_grown", grown)
-    monkeypatch.setattr(Search, "_needs_many", lambda *_: False)
+    monkeypatch.setattr(beam, "grown", grown)
+    monkeypatch.setattr(module, "grown", grown)
+    monkeypatch.setattr(beam, "_needs_many", lambda *_: False)
     monkeypatch.setattr(Search, "_concluded", lambda search: min(search.tried.values(), key=lambda e: e.bic))
     monkeypatch.setattr(Fitter, "excess", lambda *_: left or 2.0)
-    monkeypatch.setattr("host.diagnosis.search.with_offset", lambda _, sets: sets)
-    monkeypatch.setattr("host.diagnosis.search.lone_form", lone_form)
+    monkeypatch.setattr("host.diagnosis.beam.with_offset", lambda _, sets: sets)
+    monkeypatch.setattr("host.diagnosis.beam.lone_form", lone_form)
     with Workers(fitter, 1) as workers:
         found = Search(fitter, workers, lambda _: None, fitter.base, root).run()
     assert asked == ([] if asked_after is None else [asked_after])
@@ -297,10 +300,10 @@ def test_two_that_leave_far_less_than_a_dozen_are_gone_on_with(
 ) -> None:
     pair = SimpleNamespace(fit=left, bic=-2.0)
     joint: Any = SimpleNamespace(fit=4.0)
-    monkeypatch.setattr(Search, "_grown", lambda *_: [SimpleNamespace(fit=9.0, bic=-1.0), pair])
+    monkeypatch.setattr(beam, "grown", lambda *_: [SimpleNamespace(fit=9.0, bic=-1.0), pair])
     fitter: Any = SimpleNamespace(excess=lambda fit: fit)
     one: Any = SimpleNamespace(fit=5.0, bic=0.0)
     search = Search(fitter, cast("Any", None), lambda _: None, one, one)
-    assert (search._pair_instead(one, joint) is pair) is is_pair
+    assert (_pair_instead(search, one, joint) is pair) is is_pair
     nothing_left: Any = SimpleNamespace(fit=1.0)
-    assert search._pair_instead(one, nothing_left) is None
+    assert _pair_instead(search, one, nothing_left) is None

@@ -9,6 +9,7 @@ from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import BY_NAME, UNKNOWN, named, structure_of
 from host.catalogue.unknown import AS_OF_PLANE, FORMS
+from host.diagnosis import beam
 from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.files import write_extended_model
@@ -109,9 +110,13 @@ def test_what_wanders_with_time_gives_way_to_what_every_vehicle_has(monkeypatch:
     )
     for joint, gives_way in ((wandering.bic - 1.0, True), (wandering.bic + 1.0, False), (None, False)):
         found = None if joint is None else replace(fitter.root, bic=joint)
-        monkeypatch.setattr("host.diagnosis.search.together", lambda *_, found=found: found)
-        assert search._is_only_flexible(wandering, fitter.root) == gives_way
-        assert not search._is_only_flexible(motion, fitter.root)
+        monkeypatch.setattr(beam, "at_once", lambda _, leading: leading)
+        monkeypatch.setattr(beam, "together", lambda *_, found=found: found)
+        monkeypatch.setattr(beam, "_pair_instead", lambda *_: None)
+        assert beam._is_only_flexible(search, wandering, fitter.root) == gives_way
+        assert not beam._is_only_flexible(search, motion, fitter.root)
+        monkeypatch.setattr(beam, "_pair_instead", lambda *_: motion)  # two effects are gone on with first
+        assert not beam._is_only_flexible(search, wandering, fitter.root)
 
 
 @pytest.mark.long
