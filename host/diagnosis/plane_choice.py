@@ -10,9 +10,9 @@ from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import NAMING_MARGIN, margin
+from host.diagnosis.plain_waves import plain_waves
 from host.diagnosis.sea_fits import with_waves
 from host.diagnosis.search import Search
-from host.diagnosis.seas import plain_waves
 from host.diagnosis.spans import divide, excerpt
 from host.diagnosis.whole_vehicle import is_real, with_all_ordinary
 from host.diagnosis.workers import Workers

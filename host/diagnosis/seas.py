@@ -12,14 +12,13 @@ from host.catalogue.kin import OFFSETS, as_trim
 from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import SWINGING_MOMENT
 from host.diagnosis.explanation import Explanation, Names
-from host.diagnosis.fitter import LINEAR, Fitter
+from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import Leftover, leftover
 from host.diagnosis.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, ROUGH, margin
 from host.diagnosis.sea_fits import (
     WAVES,
     again_under_forces,
     as_filtered,
-    roughly_with_waves,
     with_regular_waves,
     with_sea,
     with_waves,
@@ -28,12 +27,8 @@ from host.diagnosis.search import Search
 from host.diagnosis.speed_forces import are_by_speed
 from host.diagnosis.trims import retrimmed
 from host.diagnosis.workers import Workers
-from host.waves import MOST_STEPS, is_sea, mean_moment
+from host.waves import is_sea, mean_moment
 
-MOSTLY = 0.7  # of what waves explain: of true ones a linear hull explains at most 0.4, of false ones 0.9
-PARTLY = 0.2  # of what waves gain over white forces: of false ones 0.3 and more, of plain ones at most 0.02
-NARROW = 0.26  # band of a fully developed sea; of true ones 0.03 to 0.17 was found beside a linear hull
-SOME_STEPS = 8
 MEAN_MOMENTS = 2.0  # of what it may be: four seas came to 1.0 to 1.3
 
 
@@ -143,64 +138,6 @@ def _rough(calm: Search, best: Explanation, sets: list[Explanation]) -> tuple[Se
     rough = Search(fitter, calm.workers, calm.on_progress, with_sea(fitter, calm.base), root, before)
     found = rough.run(sets)
     return (rough, found) if found.bic < least else None
-
-
-def plain_waves(fitter: Fitter) -> Explanation | None:
-    """The root among waves, where these are plain to see: likelier than white forces, and than none.
-
-    Beside the root alone, unless the water would have to follow the plane; or beside a linear hull, of which
-    a slow plane or an autopilot hides them.
-    """
-    root = fitter.root
-    if fitter.excess(root.fit) < LITTLE:
-        return None
-    sea, calm = with_sea(fitter, root), as_filtered(fitter, root).bic
-    least, gain = min(sea.bic, calm), NAMING_MARGIN
-    if roughly_with_waves(fitter, sea).bic < least - NAMING_MARGIN:
-        waves = with_waves(fitter, sea)
-        if is_sea(waves.fit) and not _follow_the_plane(fitter, sea, waves):
-            return waves
-        gain = least - waves.bic
-    if sea.bic > calm - NAMING_MARGIN or _does_a_linear_hull(fitter, calm - sea.bic):
-        return None
-    beside = _beside_hull(fitter, _linear_in(fitter, sea), gain)
-    return None if beside is None else with_waves(fitter, sea, beside.fit)
-
-
-def _follow_the_plane(fitter: Fitter, sea: Explanation, waves: Explanation) -> bool:
-    """Whether what passes for waves is mostly what the plane does to any hull, or in part to one in a sea.
-
-    Of a hull that is unstable only a filter tells that: no free run follows its linear part alone.
-    """
-    if sea.bic - _linear_in(fitter, sea).bic > PARTLY * (sea.bic - waves.bic):
-        return True
-    return _does_a_linear_hull(fitter, as_filtered(fitter, fitter.root).bic - waves.bic)
-
-
-def _does_a_linear_hull(fitter: Fitter, gain: float) -> bool:
-    """Whether a linear hull gains most of this much BIC without any forces."""
-    calm, hull = (as_filtered(fitter, one).bic for one in (fitter.root, fitter.linear))
-    return calm - hull > MOSTLY * gain
-
-
-def _linear_in(fitter: Fitter, sea: Explanation) -> Explanation:
-    """A linear hull among the white forces of a sea."""
-    hull = sea
-    for name in LINEAR:
-        hull = fitter.grown(hull, name, [])
-    return hull
-
-
-def _beside_hull(fitter: Fitter, hull: Explanation, gain: float) -> Explanation | None:
-    """A hull among waves, where these gain more BIC beside it than alone; what passes for waves less.
-
-    A few steps show whether their band is narrow: of what the hull lacks, it is as broad as may be.
-    """
-    for steps in (SOME_STEPS, MOST_STEPS):
-        beside = with_waves(fitter, hull, most_steps=steps)
-        if not (is_sea(beside.fit) and beside.fit.waves[1] < NARROW):
-            return None
-    return beside if hull.bic - beside.bic > gain else None
 
 
 def in_plain_waves(calm: Search, waves: Explanation) -> Explained:

@@ -11,21 +11,18 @@ from host.diagnosis.diagnose import _judge, _unnamed, diagnose
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
+from host.diagnosis.plain_waves import _beside_hull, _follow_the_plane, _linear_in, plain_waves
 from host.diagnosis.sea_fits import with_sea, with_waves
 from host.diagnosis.search import Search
 from host.diagnosis.seas import (
     Explained,
     Waves,
-    _beside_hull,
-    _follow_the_plane,
-    _linear_in,
     _of_the_waves,
     _rough,
     against,
     among_waves,
     explains_more,
     in_plain_waves,
-    plain_waves,
 )
 from host.diagnosis.spans import divide
 from host.diagnosis.trims import retrimmed
@@ -123,11 +120,11 @@ def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> Non
     def follow(bic: float) -> bool:
         return _follow_the_plane(fitter, sea, replace(sea, bic=bic))
 
-    monkeypatch.setattr("host.diagnosis.seas.PARTLY", np.inf)
+    monkeypatch.setattr("host.diagnosis.plain_waves.PARTLY", np.inf)
     assert follow(fitter.linear.bic)
     assert not follow(fitter.linear.bic - gain)  # twice as much
     monkeypatch.undo()
-    monkeypatch.setattr("host.diagnosis.seas.MOSTLY", np.inf)
+    monkeypatch.setattr("host.diagnosis.plain_waves.MOSTLY", np.inf)
     assert follow(sea.bic - 20.0)  # among white forces a linear hull explains more than that
     assert not follow(sea.bic - 100.0 * gain)
     monkeypatch.undo()
@@ -137,12 +134,12 @@ def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> Non
     sea = with_sea(rough, rough.root)
     hull = _linear_in(rough, sea)
     assert not _follow_the_plane(rough, sea, waves)
-    monkeypatch.setattr("host.diagnosis.seas._follow_the_plane", lambda *_: True)
+    monkeypatch.setattr("host.diagnosis.plain_waves._follow_the_plane", lambda *_: True)
     gain = hull.bic - with_waves(rough, hull).bic
     assert gain > 100.0
     assert _beside_hull(rough, hull, 0.9 * gain) is not None  # true waves gain more beside a hull
     assert _beside_hull(rough, hull, 1.1 * gain) is None
-    monkeypatch.setattr("host.diagnosis.seas.NARROW", 0.02)
+    monkeypatch.setattr("host.diagnosis.plain_waves.NARROW", 0.02)
     assert plain_waves(rough) is None
 
 
