@@ -38,7 +38,9 @@ def beam_search(search: "Search") -> None:
             pair = _pair_instead(search, beam[0], joint) if size == 2 else None
             if pair is not None:
                 beam, postponed = [pair], joint
-            elif together(search, beam[0], joint) is not None or search.is_led_elsewhere:
+            elif not _is_explained_otherwise(search, joint) and (
+                together(search, beam[0], joint) is not None or search.is_led_elsewhere
+            ):
                 break
         found = search.singles() if size == 1 else grown(search, beam, size)
         best_before = min(e.bic for e in beam)
@@ -58,7 +60,8 @@ def beam_search(search: "Search") -> None:
             foreign = lone_form(search, leading)
             if foreign is not None and _is_only_flexible(search, foreign, leading):
                 break
-    if postponed is not None and search.fitter.excess(search.likeliest.fit) > LITTLE:
+    is_short = postponed is not None and search.fitter.excess(search.likeliest.fit) > LITTLE
+    if postponed is not None and is_short and not search.instead():
         together(search, leading, postponed)
 
 
@@ -66,7 +69,12 @@ def _needs_many(search: "Search", leading: Explanation, size: int) -> bool:
     """Whether it is time, once, to try all that every vehicle has: far too much is left, or too much."""
     if size == 1 or search.joint or search.root.fit.has_process_noise:
         return False
-    return search.fitter.excess(leading.fit) > (MUCH if size <= SMALL else LITTLE) and not search.instead()
+    return search.fitter.excess(leading.fit) > (MUCH if size <= SMALL else LITTLE)
+
+
+def _is_explained_otherwise(search: "Search", joint: Explanation) -> bool:
+    """Whether all that every vehicle has leaves much, and waves, whose search takes longer, nothing."""
+    return search.fitter.excess(joint.fit) > MUCH and search.instead()
 
 
 def _with_best_pair(search: "Search", singles: list[Explanation]) -> list[Explanation]:
@@ -104,7 +112,7 @@ def _is_only_flexible(search: "Search", foreign: Explanation, leading: Explanati
     if not foreign.names & WANDERING:
         return False
     begun = at_once(search, leading)
-    if _pair_instead(search, leading, begun) is not None:
+    if _pair_instead(search, leading, begun) is not None or _is_explained_otherwise(search, begun):
         return False
     joint = together(search, leading, begun)
     return joint is not None and joint.bic < foreign.bic

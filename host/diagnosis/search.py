@@ -50,7 +50,7 @@ class Search:
              among those that are likeliest beside it, once asked
     asks_drift  whether something may drift beside white noise; `adrift` a set beside that, where it is plain
     is_second  it was all searched with the plane the other way, too, where no continuation helped
-    instead  whether something else explains the recordings: then not all that every vehicle has is tried
+    instead  whether something else explains the recordings: then no continuation is tried
     """
 
     fitter: Fitter

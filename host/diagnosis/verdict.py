@@ -25,6 +25,7 @@ from host.uncertainty import safe_inverse
 
 Verdict = Literal["no_mismatch", "explained", "partly_explained", "unexplained"]
 WORSE = 2.0  # chi2 of held-out spans from which on an explanation must at least better the base there
+MORE_THAN_NOISE = 1.1  # times it, as it would be said with one digit
 MOST_RARE = 2  # effects at once that not every vehicle has
 FAINT_WAVES = 30.0  # of BIC over all else: what a late hull imitates reaches about half of that
 BY_SEA = " Random forces act as well (waves, current, turbulence); they are part of the noise model."
@@ -202,7 +203,12 @@ def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfi
     is_part = verdict == "partly_explained"
     begin = "Most is explained, but" if is_part else "None of the physics in the catalogue explains this:"
     run = "a few seconds ahead" if left.is_by_speed or left.is_no_sea else "in a free run"
-    return f"{begin} {worst} is still off by {size:.1f} times its sensor noise {run}; {kind}.{forms}" + sea
+    off = (
+        f"{size:.1f} times its sensor noise"
+        if size >= MORE_THAN_NOISE
+        else "hardly more than its sensor noise"
+    )
+    return f"{begin} {worst} is still off by {off} {run}; {kind}.{forms}" + sea
 
 
 def _drift(wander: Array) -> str:

@@ -83,6 +83,12 @@ def test_many_effects_that_few_vehicles_have_are_doubted_by_name(base: Explanati
     assert "what was learnt does not hold on the stretches that were held out" in off
 
 
+@pytest.mark.parametrize(("chi2", "off"), [(9.0, "3.0 times its"), (1.1, "hardly more than its")])
+def test_what_is_left_is_told_by_its_size(base: Explanation, chi2: float, off: str) -> None:
+    said = remaining("partly_explained", named(base, RARE[0]), leftover(is_smooth=True), misfit(chi2))
+    assert f"is still off by {off} sensor noise in a free run" in said
+
+
 def test_what_explains_all_but_the_stretches_that_were_held_out_says_so(base: Explanation) -> None:
     one = named(base, RARE[0])
     assert remaining("explained", one, leftover(), misfit(1.2)).endswith("sensors' own noise.")

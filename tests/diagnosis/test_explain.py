@@ -7,7 +7,7 @@ from typing import Any, cast
 import pytest
 
 from host.diagnosis import explain as module
-from host.diagnosis.beam import _needs_many
+from host.diagnosis.beam import _is_explained_otherwise, _needs_many
 from host.diagnosis.explain import _alike
 from host.diagnosis.margins import LARGEST_SET, LITTLE
 from host.diagnosis.search import Search
@@ -110,12 +110,13 @@ def test_waves_that_are_plain_to_see_are_searched_once_where_they_matter(
 
 
 @pytest.mark.parametrize("is_for_few", [False, True])
-def test_what_a_few_explain_needs_no_dozen(is_for_few: bool) -> None:
+def test_what_a_few_explain_among_waves_needs_no_continuation(is_for_few: bool) -> None:
     one: Any = explanation(frozenset())
     search = Search(
         fitter_that_leaves(3.0), cast("Any", None), lambda _: None, one, one, instead=lambda: is_for_few
     )
-    assert _needs_many(search, one, 2) is not is_for_few
+    assert _needs_many(search, one, 2)
+    assert _is_explained_otherwise(search, one) is is_for_few
 
 
 @pytest.mark.parametrize("is_pushed", [False, True])
