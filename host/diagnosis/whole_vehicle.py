@@ -109,12 +109,14 @@ def widened(std: dict[str, float], found: Explanation, whole: Explanation) -> di
     widths = np.array([p.upper - p.lower for p in fit.structure.parameters])
     information = fit.information + np.diag(np.where(unnamed, 12.0 / widths**2, 0.0))
     beside = np.sqrt(np.diag(covariance_within(replace(fit, information=information))))
+    most = widths / np.sqrt(12.0)  # of a draw between the bounds: where the recordings tell nothing
     beside[np.isin(names, list(structure.moments))] = 0.0
     wider = dict(std)
     for name, value in zip(structure.names, found.fit.parameters.tolist(), strict=True):
         k = names.index(name)
         if std[name] > 0.0:
-            wider[name] = float(np.hypot(max(std[name], beside[k]), value - fit.parameters[k]))
+            apart = np.hypot(max(std[name], beside[k]), value - fit.parameters[k])
+            wider[name] = max(std[name], float(min(apart, most[k])))
     return wider
 
 

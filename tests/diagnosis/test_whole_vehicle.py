@@ -117,6 +117,19 @@ def test_a_moment_is_as_well_known_as_it_was() -> None:
     assert widened(std, lost, all_of_it)["effectiveness_time"] == pytest.approx(np.hypot(0.1, shift))
 
 
+def test_what_the_recordings_tell_nothing_of_lies_between_its_bounds() -> None:
+    fitter, best = few()
+    all_of_it = with_all_ordinary(fitter, best)
+    structure, information = all_of_it.fit.structure, all_of_it.fit.information.copy()
+    k = structure.names.index("c_wq")
+    information[k] = information[:, k] = 0.0
+    information[k, k] = 1e-30
+    blind = replace(all_of_it, fit=replace(all_of_it.fit, information=information))
+    bounds = structure.parameters[k]
+    most = (bounds.upper - bounds.lower) / np.sqrt(12.0)
+    assert widened(deviations_of(best), best, blind)["c_wq"] == pytest.approx(most)
+
+
 def point_of(explanation: Explanation) -> Point:
     fit = explanation.fit
     return Point(fit.structure, fit.parameters, fit.initial, fit.noise)
