@@ -61,6 +61,7 @@ def explain(
         return drift
     if search.adrift is not None:
         search = Search(fitter, workers, on_progress, fitter.base, fitter.root, alone=search.alone_so_far())
+        search.is_second = is_second
         best = search.run(again)
     left, told, calm = leftover(fitter, best), None, best
     may_be_sea = part is None or part.best.fit.has_process_noise
