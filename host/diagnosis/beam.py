@@ -6,7 +6,7 @@ leave far less than that; and one form of unknown physics (host.diagnosis.lone_f
 
 from typing import TYPE_CHECKING
 
-from host.catalogue import named
+from host.catalogue import UNKNOWN, named
 from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import WANDERING
 from host.diagnosis.explanation import Explanation, Names
@@ -28,7 +28,7 @@ FAR_LESS = 0.5  # of what a dozen effects leave: two that come so near are the w
 
 def beam_search(search: "Search") -> None:
     """Sets of up to four effects, carried side by side, and what joins at once; all are remembered."""
-    beam = [search.root]
+    beam = [search.remember(search.root)]
     foreign, leading, enough, postponed = None, search.root, None, None
     for size in range(1, LARGEST_SET + 1):
         if size == 2 and _needs_many(search, beam[0], size):
@@ -58,11 +58,21 @@ def beam_search(search: "Search") -> None:
             leading, enough = beam[0], _most_without_form(search, beam[0])
         if size == enough:
             foreign = lone_form(search, leading)
-            if foreign is not None and _is_only_flexible(search, foreign, leading):
-                break
-    is_short = postponed is not None and search.fitter.excess(search.likeliest.fit) > LITTLE
-    if postponed is not None and is_short and not search.instead():
+            if foreign is not None and foreign.names & WANDERING:
+                joint = at_once(search, leading)
+                pair = _pair_instead(search, leading, joint)
+                if pair is not None:
+                    beam, postponed = [pair], joint
+                elif _is_only_flexible(search, foreign, leading, joint):
+                    break
+    if postponed is not None and _leave_something(search) and not search.instead():
         together(search, leading, postponed)
+
+
+def _leave_something(search: "Search") -> bool:
+    """Whether more than a little is left by the catalogue alone: a form that wanders follows anything."""
+    known = (e for names, e in search.tried.items() if not names & UNKNOWN.keys())
+    return search.fitter.excess(min(known, key=lambda e: e.bic).fit) > LITTLE
 
 
 def _needs_many(search: "Search", leading: Explanation, size: int) -> bool:
@@ -107,15 +117,14 @@ def _most_without_form(search: "Search", leading: Explanation) -> int | None:
     return 1 if search.fitter.excess(leading.fit) > LITTLE else SMALL
 
 
-def _is_only_flexible(search: "Search", foreign: Explanation, leading: Explanation) -> bool:
+def _is_only_flexible(
+    search: "Search", foreign: Explanation, leading: Explanation, joint: Explanation
+) -> bool:
     """Whether what wanders with time only stands for what every vehicle has, which moves as slowly."""
-    if not foreign.names & WANDERING:
+    if _is_explained_otherwise(search, joint):
         return False
-    begun = at_once(search, leading)
-    if _pair_instead(search, leading, begun) is not None or _is_explained_otherwise(search, begun):
-        return False
-    joint = together(search, leading, begun)
-    return joint is not None and joint.bic < foreign.bic
+    settled = together(search, leading, joint)
+    return settled is not None and settled.bic < foreign.bic
 
 
 def _parents(search: "Search", found: list[Explanation]) -> list[Explanation]:

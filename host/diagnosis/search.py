@@ -247,11 +247,6 @@ class Search:
         return best
 
     @property
-    def likeliest(self) -> Explanation:
-        """Of all that was tried, a free trim in it or not."""
-        return min(self.tried.values(), key=lambda e: e.bic)
-
-    @property
     def follows_no_free_run(self) -> bool:
         """Whether slight forces let the equations follow a vehicle that they lose without: it is unstable."""
         return self.steered is not None and self._is_lost and self.fitter.are_slight(self.steered.fit.noise)
@@ -264,7 +259,10 @@ class Search:
         """
         if self.steered is None or not self._is_lost:
             return False
-        return self.steered.bic < self.likeliest.bic - FAR_LIKELIER * self.steered.fit.samples
+        return (
+            self.steered.bic
+            < min(e.bic for e in self.tried.values()) - FAR_LIKELIER * self.steered.fit.samples
+        )
 
     @property
     def _is_lost(self) -> bool:

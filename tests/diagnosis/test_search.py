@@ -307,3 +307,41 @@ def test_two_that_leave_far_less_than_a_dozen_are_gone_on_with(
     assert (_pair_instead(search, one, joint) is pair) is is_pair
     nothing_left: Any = SimpleNamespace(fit=1.0)
     assert _pair_instead(search, one, nothing_left) is None
+
+
+@pytest.mark.parametrize(
+    ("form", "pair_leaves", "asked"),
+    [
+        ("unknown_wandering_moment", 3.0, ["a dozen", "continuation"]),
+        ("unknown_wandering_moment", 1.05, ["a dozen"]),
+        ("unknown_moment_q_q", 3.0, []),  # it is no more flexible than an effect is
+    ],
+    ids=["two are not enough", "two are", "a form of the motion"],
+)
+def test_what_wanders_ends_no_search_before_a_dozen_were_tried(
+    form: str, pair_leaves: float, asked: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def leaving(left: float, bic: float, *names: str) -> Any:
+        one = SimpleNamespace(names=frozenset(names), fit=left, bic=bic, leaves_white=False)
+        one.lean = lambda: one
+        return one
+
+    root = leaving(20.0, 0.0, "free_trim")
+    single = leaving(10.0, -50.0, "free_trim", "actuator_lag")
+    pair = leaving(pair_leaves, -90.0, "free_trim", "actuator_lag", "munk_moment")
+    foreign = leaving(1.0, -1000.0, "free_trim", form)
+    done: list[str] = []
+    monkeypatch.setattr(module, "grown", lambda search, *_: [search.remember(single)])
+    monkeypatch.setattr(beam, "grown", lambda search, *_: [search.remember(pair)])
+    monkeypatch.setattr(beam, "_needs_many", lambda *_: False)
+    monkeypatch.setattr(beam, "_most_without_form", lambda *_: 1)
+    monkeypatch.setattr(beam, "margin", lambda _: 6.0)
+    monkeypatch.setattr(beam, "with_offset", lambda _, sets: sets)
+    monkeypatch.setattr(beam, "lone_form", lambda *_: foreign)
+    monkeypatch.setattr(beam, "at_once", lambda *_: done.append("a dozen") or leaving(9.0, 0.0))
+    monkeypatch.setattr(beam, "together", lambda *_: done.append("continuation"))
+    fitter: Any = SimpleNamespace(excess=lambda left: left)
+    search = Search(fitter, cast("Any", None), lambda _: None, root, root)
+    beam.beam_search(search)
+    assert done == asked
+    assert foreign.names in search.tried

@@ -104,19 +104,11 @@ def test_a_form_that_hardly_betters_what_is_known_is_no_lone_one() -> None:
 def test_what_wanders_with_time_gives_way_to_what_every_vehicle_has(monkeypatch: pytest.MonkeyPatch) -> None:
     fitter = Fitter([hidden_dive(duration=20.0)])
     search = Search(fitter, Workers(fitter, 1), lambda _: None, fitter.base, fitter.root)
-    wandering, motion = (
-        replace(fitter.root, names=fitter.root.names | {name})
-        for name in ("unknown_wandering_moment", "unknown_moment_q_q")
-    )
+    wandering = replace(fitter.root, names=fitter.root.names | {"unknown_wandering_moment"})
     for joint, gives_way in ((wandering.bic - 1.0, True), (wandering.bic + 1.0, False), (None, False)):
         found = None if joint is None else replace(fitter.root, bic=joint)
-        monkeypatch.setattr(beam, "at_once", lambda _, leading: leading)
         monkeypatch.setattr(beam, "together", lambda *_, found=found: found)
-        monkeypatch.setattr(beam, "_pair_instead", lambda *_: None)
-        assert beam._is_only_flexible(search, wandering, fitter.root) == gives_way
-        assert not beam._is_only_flexible(search, motion, fitter.root)
-        monkeypatch.setattr(beam, "_pair_instead", lambda *_: motion)  # two effects are gone on with first
-        assert not beam._is_only_flexible(search, wandering, fitter.root)
+        assert beam._is_only_flexible(search, wandering, fitter.root, fitter.root) == gives_way
 
 
 @pytest.mark.long
