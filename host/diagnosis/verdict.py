@@ -41,9 +41,7 @@ DRIFT = (
 CORRECTED = " The model corrects the measured speed, which errs, by the surge equation (speed_correction)."
 CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
 NEARLY_CANCELLED = 0.85  # the same of one channel, beside a drag: by chance one in thirty
-NO_COUPLING = (
-    2.0  # times the forward speed, is so large: masses allow for less than one (host.diagnosis.charges)
-)
+NO_COUPLING = 2.0  # times the forward speed: masses allow for less than one (host.diagnosis.charges)
 NO_MUNK = 6.0  # times what all of heave's damping would do at the plane
 LEAST_LEVER = 1.0  # 1/m, of the plane's moment over its force: less is a plane amidships
 LARGEST_SHARE = 4.0  # of what geometry gives, that bounds allow

@@ -88,12 +88,9 @@ def write_page(
         loader=FileSystemLoader(Path(__file__).parent), autoescape=select_autoescape(default=True)
     )
     rows = [name for name in (NOTHING, *KINDS, *STRANGERS) if any(h == name for h, _ in result.confusion)]
-    unhidden = {named for _, named in result.confusion} - {NOTHING, *KINDS}
-    columns = [
-        NOTHING,
-        *KINDS,
-        *sorted(unhidden),
-    ]  # every name that was given, or a row would be short of some
+    # Every name that was given, or a row would be short of some.
+    never_hidden = {named for _, named in result.confusion} - {NOTHING, *KINDS}
+    columns = [NOTHING, *KINDS, *sorted(never_hidden)]
     matrix = []
     for hidden in rows:
         counts = [result.confusion.get((hidden, named), 0) for named in columns]
