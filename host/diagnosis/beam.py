@@ -38,8 +38,10 @@ def beam_search(search: "Search") -> None:
             pair = _pair_instead(search, beam[0], joint) if size == 2 else None
             if pair is not None:
                 beam, postponed = [pair], joint
-            elif not _is_explained_otherwise(search, joint) and (
-                together(search, beam[0], joint) is not None or search.is_led_elsewhere
+            elif (
+                _is_explained_otherwise(search, joint)
+                or together(search, beam[0], joint) is not None
+                or search.is_led_elsewhere
             ):
                 break
         found = search.singles() if size == 1 else grown(search, beam, size)
@@ -84,7 +86,8 @@ def _needs_many(search: "Search", leading: Explanation, size: int) -> bool:
 
 def _is_explained_otherwise(search: "Search", joint: Explanation) -> bool:
     """Whether all that every vehicle has leaves much, and waves, whose search takes longer, nothing."""
-    return search.fitter.excess(joint.fit) > MUCH and search.instead()
+    search.is_needless = search.fitter.excess(joint.fit) > MUCH and search.instead()
+    return search.is_needless
 
 
 def _with_best_pair(search: "Search", singles: list[Explanation]) -> list[Explanation]:

@@ -16,7 +16,7 @@ from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import Leftover
 from host.diagnosis.locate import Location, locate
 from host.diagnosis.minute import LEAST_ANGLE, minute_in
-from host.diagnosis.plane_choice import Way, by_single_effects, is_likelier, ways
+from host.diagnosis.plane_choice import Way, is_likelier, likelier_first, ways
 from host.diagnosis.scoring import Misfit, foretells, free_run_errors, misfit
 from host.diagnosis.sea_fits import WAVES, again_in_waves, again_under_forces, with_regular_waves
 from host.diagnosis.search import Search
@@ -59,7 +59,11 @@ class NamedEffect:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosis:
-    """What `mils diagnose` found; the fits are those over all the recordings."""
+    """What `mils diagnose` found; the fits are those over all the recordings.
+
+    ranking  effects by the BIC each takes off alone, the best first; where none was tried alone, those that
+             are named, by what each is worth beside the others
+    """
 
     verdict: Verdict
     recordings: list[Recording]
@@ -75,6 +79,7 @@ class Diagnosis:
     location: Location
     force: UnknownForce
     ranking: Ranking
+    is_ranked_alone: bool
     remaining: str
     has_sea: bool
     bic: float
@@ -110,7 +115,7 @@ def diagnose(
     check_usable(recordings)
     on_progress("base model")
     seen = as_sensed(without_outliers(with_plane_told(recordings)))
-    first, *others = by_single_effects(ways(seen), on_progress, jobs)
+    first, *others = likelier_first(ways(seen), on_progress, jobs)
     return _diagnosed(first, others, on_progress, jobs, like, [])
 
 
@@ -166,6 +171,7 @@ def _diagnosed(
     values = dict(zip(extended.fit.structure.names, extended.fit.parameters.tolist(), strict=True))
     effects = [_with_coefficients(effect, values, std) for effect in judged.effects]
     errors = free_run_errors(base, longest)
+    alone = max(_ranking(search), ranking, key=len)
     told = remaining(judged.verdict, best, left, judged.after, evidence(waves))
     return Diagnosis(
         verdict=judged.verdict,
@@ -181,7 +187,8 @@ def _diagnosed(
         slots=judged.slots,
         location=locate(longest, errors, floor, values["u0"]),
         force=unknown_force(longest, {n: values[n] for n in NAMES}, floor, fitter.accelerations),
-        ranking=max(_ranking(search), ranking, key=len),
+        ranking=alone or [(effect.name, effect.delta_bic) for effect in effects],
+        is_ranked_alone=bool(alone),
         remaining=" ".join([told, *_unnamed(best, waves), *_other_answers(found)]),
         has_sea=best.fit.has_process_noise,
         bic=best.bic,

@@ -23,7 +23,8 @@ ROUNDS = 3  # of a search and of the levels beside what it found
 def in_drift(calm: Search, first: Explanation) -> Explained | None:
     """The search from a set of many beside what drifts with it.
 
-    None where in the end nothing does, or effects or random forces in the place of what drifts are likelier.
+    None where in the end nothing does, or effects or random forces in the place of what drifts are likelier;
+    the search without it then remembers what was found.
     While sets are compared what drifts stays as it was first found; it is estimated again beside the best.
     """
     fitter, found = calm.fitter, first
@@ -32,13 +33,13 @@ def in_drift(calm: Search, first: Explanation) -> Explained | None:
         found = search.run_from(untrimmed(search.fitter, found)) if number == 0 else search.settle(found)
         again = drifting(fitter, found)
         if again is None:
+            calm.remember(fitter.reduced(found, found.names))
             return None
         if again.bic > found.bic - TWIN_MARGIN or number == ROUNDS - 1:
             break
         found = again
-    if with_sea(fitter, found).bic < found.bic - CLEARLY:
-        return None
-    if _with_effects_instead(calm, found).bic < found.bic - NAMING_MARGIN:
+    instead = _with_effects_instead(calm, found)
+    if with_sea(fitter, found).bic < found.bic - CLEARLY or instead.bic < found.bic - NAMING_MARGIN:
         return None
     return Explained(found, search, leftover(search.fitter, found), None)
 

@@ -1,6 +1,6 @@
 """From the recordings to the explanation: the search, then the doubt about what it found."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 
 from host.catalogue import UNKNOWN
@@ -55,14 +55,16 @@ def explain(
     if plain is not None:
         search.instead = plain.leave_nothing
     again = [fitter.refitted(one) for one in _found_in(part)] if part else _alike(fitter, like)
+    search.outset = way.outset if not again else None
     best = search.run(again)
     drift = None if search.adrift is None else in_drift(search, search.adrift)
     if drift is not None and drift.left.is_nothing:
         return drift
     if search.adrift is not None:
+        tried = search.tried.values()
         search = Search(fitter, workers, on_progress, fitter.base, fitter.root, alone=search.alone_so_far())
         search.is_second = is_second
-        best = search.run(again)
+        best = search.run(again or _many_in(tried))
     left, told, calm = leftover(fitter, best), None, best
     may_be_sea = part is None or part.best.fit.has_process_noise
     is_astray = may_be_sea and not (left.is_nothing or best.fit.has_process_noise)
@@ -137,6 +139,12 @@ def _alike(fitter: Fitter, like: Explanation | None) -> list[Explanation]:
         return []
     again = fitter.refitted(like)
     return [again] if fitter.excess(again.fit) < LITTLE else []
+
+
+def _many_in(tried: Iterable[Explanation]) -> list[Explanation]:
+    """The likeliest set of all that were tried, where it is one of many effects that leaves white noise."""
+    best = min(tried, key=lambda e: e.bic)
+    return [best] if len(best.names) > LARGEST_SET and best.leaves_white else []
 
 
 def _found_in(part: Explained) -> list[Explanation]:

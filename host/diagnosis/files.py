@@ -77,6 +77,7 @@ def document(answer: Answer) -> dict[str, Any]:
             "depth_m": float(np.sqrt(found.floor[1])),
         },
         "bic": found.bic,
+        "ranked": "alone" if found.is_ranked_alone else "beside the others",
         "ranking": [{"name": name, "delta_bic": gain} for name, gain in found.ranking],
         "is_held_out": found.is_held_out,
         "horizon_s": found.horizon,

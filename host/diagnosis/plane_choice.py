@@ -10,6 +10,7 @@ from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import NAMING_MARGIN, margin
+from host.diagnosis.outset import at_the_outset
 from host.diagnosis.plain_waves import plain_waves
 from host.diagnosis.sea_fits import with_waves
 from host.diagnosis.search import Search
@@ -27,19 +28,21 @@ class Way(NamedTuple):
     """The recordings with the plane taken one way, and the base fitted to what a search begins with.
 
     waves  the root among waves, where these are plain to see
+    outset  the root with all that every vehicle has, where that leaves nothing, or next to nothing
     alone  each effect alone, where these were fitted
     """
 
     recordings: list[Recording]
     fitter: Fitter
     waves: Explanation | None = None
+    outset: Explanation | None = None
     alone: tuple[Explanation, ...] = ()
 
 
 def ways(recordings: list[Recording]) -> list[Way]:
     """The recordings with a plane that held its angles and with one that moved, the likelier first.
 
-    As the base equations see them, among waves where there are any: what is left out may favour the other.
+    As the base equations see them: what is left out may favour the other.
     """
     moving = [with_moving_plane(recording) for recording in recordings]
     is_same = all(np.array_equal(a.rudder, b.rudder) for a, b in zip(recordings, moving, strict=True))
@@ -47,10 +50,37 @@ def ways(recordings: list[Recording]) -> list[Way]:
     teaching = [divide(each).teaching for each in tried]
     parts = [excerpt(runs, like=teaching[0]) for runs in teaching]
     fitted = [Way(each, Fitter(part)) for each, part in zip(tried, parts, strict=True)]
-    fitted.sort(key=lambda way: way.fitter.base.bic)
-    leading, *rest = fitted
+    return sorted(fitted, key=lambda way: way.fitter.base.bic)
+
+
+def likelier_first(found: list[Way], on_progress: Callable[[str], None], jobs: int) -> list[Way]:
+    """The ways, the likelier first, as what tells more than the base equations do sees them.
+
+    That is all that every vehicle has, where nothing is left beside it; else plain waves, where there are
+    any; else all that every vehicle has, where next to nothing is left; else single effects.
+    """
+    leading, *others = sorted(found, key=lambda way: way.fitter.root.bic)
+    whole = at_the_outset(leading.fitter)
+    if whole is not None and whole.leaves_white:
+        return _by_whole([leading, *others], whole)
+    seen = _among_waves(found)
+    if seen or whole is None:
+        return seen or by_single_effects(found, on_progress, jobs)
+    return _by_whole([leading, *others], whole)
+
+
+def _by_whole(found: list[Way], whole: Explanation) -> list[Way]:
+    """The ways as all that every vehicle has sees them, which was fitted to the first."""
+    there = (way.fitter.reduced(whole, whole.names) for way in found[1:])
+    begun = [way._replace(outset=one) for way, one in zip(found, [whole, *there], strict=True)]
+    return sorted(begun, key=lambda way: inf if way.outset is None else way.outset.bic)
+
+
+def _among_waves(found: list[Way]) -> list[Way]:
+    """The ways among waves, where these are plain to see in the first; else none."""
+    leading, *rest = found
     if (waves := plain_waves(leading.fitter)) is None:
-        return fitted
+        return []
     seen = [leading._replace(waves=waves), *(way._replace(waves=plain_waves(way.fitter)) for way in rest)]
     return sorted(seen, key=lambda way: inf if way.waves is None else way.waves.bic)
 
@@ -60,7 +90,7 @@ def by_single_effects(found: list[Way], on_progress: Callable[[str], None], jobs
 
     The base equations bend towards what they lack, and may follow the wrong way better by chance.
     """
-    if len(found) == 1 or found[0].waves is not None:
+    if len(found) == 1:
         return found
     leading, other = sorted(found, key=lambda way: min(way.fitter.root.bic, way.fitter.linear.bic))
     with Workers(leading.fitter, jobs) as workers:

@@ -21,6 +21,7 @@ from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import LARGEST_SET, MUCH, ROUGH, SMALL
 from host.diagnosis.offset_choice import with_best_offsets, with_likeliest_offsets
+from host.diagnosis.outset import goes_on_from
 from host.diagnosis.prospects import gain
 from host.diagnosis.pruning import pruned
 from host.diagnosis.rarity import told_by_the_usual
@@ -50,7 +51,9 @@ class Search:
              among those that are likeliest beside it, once asked
     asks_drift  whether something may drift beside white noise; `adrift` a set beside that, where it is plain
     is_second  it was all searched with the plane the other way, too, where no continuation helped
-    instead  whether something else explains the recordings: then no continuation is tried
+    outset  the root with all that every vehicle has, where that leaves nothing, or next to nothing
+    instead  whether something else explains the recordings: asked where a dozen effects leave much
+    is_needless  it does, so no more is made of what was tried
     """
 
     fitter: Fitter
@@ -66,7 +69,9 @@ class Search:
     steered: Explanation | None = None
     at_sea: Explanation | None = None
     is_second: bool = False
+    outset: Explanation | None = None
     instead: Callable[[], bool] = lambda: False
+    is_needless: bool = False
     asks_drift: bool = False
     adrift: Explanation | None = None
     _shrunk: dict[Names, set[Names]] = field(default_factory=dict)  # those fitted from larger sets: which
@@ -83,10 +88,13 @@ class Search:
             settled = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
             found = self._settled(min(settled, key=lambda e: e.bic))
             return found if self.part is not None else told_by_the_usual(self, whole(self, found))
-        beam_search(self)
+        if self.outset is not None and goes_on_from(self, self.outset):
+            return self._concluded()
+        if not self.is_led_elsewhere:
+            beam_search(self)
         if self.is_led_elsewhere:
             return min((e for e in self.tried.values() if FREE_TRIM.name not in e.names), key=lambda e: e.bic)
-        return self._concluded()
+        return with_best_offsets(self) if self.is_needless else self._concluded()
 
     def run_from(self, joint: Explanation) -> Explanation:
         """The best explanation from a set of many: with what else promises most, pruned and exchanged."""

@@ -86,6 +86,12 @@ def idle_values(fitter: "Fitter", names: Names, known: dict[str, float]) -> Arra
     return structure.clipped(np.array([values[name] for name in structure.names]))
 
 
+def begun_beside(fitter: "Fitter", at: Point, names: Names) -> Point:
+    """A start of a larger set at a point of a smaller one: what joins hardly acts there yet."""
+    known = dict(zip(at.structure.names, at.parameters.tolist(), strict=True))
+    return Point(structure_of(names), idle_values(fitter, names, known), at.initial, at.noise)
+
+
 def scanned(fitter: "Fitter", start: Point) -> Point:
     """The start with each of its moments where a free run is nearest to the recordings, all else held.
 

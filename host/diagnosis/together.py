@@ -5,7 +5,7 @@ and a search that carries sets side by side costs most where sets are large. So 
 all that every vehicle has joins it, then what else promises most, and what does not pay is dropped at last.
 """
 
-from math import isfinite
+from math import inf, isfinite, log
 from typing import TYPE_CHECKING
 
 from host.catalogue import ORDINARY
@@ -77,7 +77,7 @@ def with_more(search: "Search", best: Explanation, least: float = LITTLE) -> Exp
         if left < least:
             break
         found = search.workers.results(_more(search, best))
-        near = search.polished_near(found, min(e.bic for e in found))
+        near = search.polished_near(found, min((e.bic for e in found), default=inf))
         better = min(near, key=lambda e: e.bic, default=best)  # none is near where all run away
         if better.bic > best.bic - margin(better):
             break
@@ -150,10 +150,14 @@ def _by_continuation(search: "Search") -> Explanation | None:
 
 
 def _more(search: "Search", best: Explanation) -> list[Task]:
-    """The set with one of the most promising effects more, or with an offset in place of the free trim."""
-    gains = search.gains(best)
+    """The set with one of the most promising effects more, or with an offset in place of the free trim.
+
+    Of one that leaves white noise it is well foretold what pays, and a free trim does what an offset would.
+    """
+    gains, is_done = search.gains(best), best.leaves_white
+    least = margin(best) + log(best.fit.samples) if is_done else -inf
     promising = sorted(gains, key=lambda name: -gains[name])[:FEW]
-    tasks = [search.growth(best, name) for name in promising]
-    if FREE_TRIM.name in best.names:
+    tasks = [search.growth(best, name) for name in promising if gains[name] > least]
+    if FREE_TRIM.name in best.names and not is_done:
         tasks += [(retrimmed, (best, frozenset({name}))) for name in OFFSETS]
     return tasks

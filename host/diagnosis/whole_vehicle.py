@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import chi2
 
-from host.catalogue import BY_NAME, FAINT, ORDINARY, structure_of
+from host.catalogue import BY_NAME, FAINT, ORDINARY
 from host.catalogue.nuisance import SPEED_CORRECTION
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.margins import margin
 from host.diagnosis.pruning import pruned
-from host.diagnosis.starts import idle_values
+from host.diagnosis.starts import begun_beside
 from host.gauss_newton import Point
 from host.uncertainty import covariance_within
 from host.valleys import are_apart, look_alikes
@@ -65,7 +65,7 @@ def with_all_ordinary(fitter: "Fitter", parent: Explanation) -> Explanation:
     fit, names = parent.fit, parent.names | {*ORDINARY, *FAINT}
     names |= {SPEED_CORRECTION.name} & {*fitter.tools_beside(names)}
     here = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
-    starts = [_begun(fitter, start, names) for start in (here, *look_alikes(here))]
+    starts = [begun_beside(fitter, start, names) for start in (here, *look_alikes(here))]
     return fitter.polished(fitter.explained(names, fitter.fitted(starts)))
 
 
@@ -118,8 +118,3 @@ def widened(std: dict[str, float], found: Explanation, whole: Explanation) -> di
             apart = np.hypot(max(std[name], beside[k]), value - fit.parameters[k])
             wider[name] = max(std[name], float(min(apart, most[k])))
     return wider
-
-
-def _begun(fitter: "Fitter", at: Point, names: Names) -> Point:
-    known = dict(zip(at.structure.names, at.parameters.tolist(), strict=True))
-    return Point(structure_of(names), idle_values(fitter, names, known), at.initial, at.noise)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from hidden_dive import Extra, hidden_dive, nothing
 
+from host.diagnosis import drifts
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.drift_fits import beside, drifting
-from host.diagnosis.drifts import again_in_drift
+from host.diagnosis.drifts import again_in_drift, in_drift
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.files import write_extended_model
 from host.diagnosis.fitter import Fitter
@@ -105,6 +106,18 @@ def test_workers_keep_a_fitter_for_all_that_drifts(gusty: tuple[Fitter, Explanat
     assert not plain.fit.has_coloured_noise
     np.testing.assert_allclose(here.fit.wander[2], found.fit.wander[2], rtol=0.1)
     assert here.bic == pytest.approx(among.grown(found, "heave_pitch_rate_coupling", []).bic, abs=1e-6)
+
+
+def test_what_was_found_beside_drift_that_is_not_there_is_remembered(
+    gusty: tuple[Fitter, Explanation], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitter, found = gusty
+    coupled = fitter.grown(fitter.base, "heave_pitch_rate_coupling", [])
+    search = Search(fitter, Workers(fitter, 1), lambda _: None, fitter.base, fitter.root)
+    monkeypatch.setattr(drifts, "drifting", lambda *_: None)
+    monkeypatch.setattr(Search, "run_from", lambda *_: coupled)
+    assert in_drift(search, found) is None
+    assert coupled.names in search.tried
 
 
 def test_what_drifts_on_a_part_is_looked_for_on_the_whole(gusty: tuple[Fitter, Explanation]) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from host.diagnosis import explain as module
 from host.diagnosis.beam import _is_explained_otherwise, _needs_many
-from host.diagnosis.explain import _alike
+from host.diagnosis.explain import _alike, _many_in
 from host.diagnosis.margins import LARGEST_SET, LITTLE
 from host.diagnosis.search import Search
 from host.diagnosis.seas import Explained
@@ -43,6 +43,19 @@ def test_else_the_search_begins_anew(like: Any, excess: float) -> None:
     assert _alike(fitter_that_leaves(excess), like) == []
 
 
+@pytest.mark.parametrize(
+    ("names", "is_white", "is_begun_with"),
+    [(MANY, True, True), (MANY, False, False), (frozenset({"actuator_lag"}), True, False)],
+    ids=["many", "not all", "few"],
+)
+def test_what_was_found_beside_drift_is_begun_with_where_it_is_many_effects(
+    names: frozenset[str], is_white: bool, is_begun_with: bool
+) -> None:
+    best: Any = SimpleNamespace(names=names, leaves_white=is_white, bic=-2.0)
+    worse: Any = SimpleNamespace(names=MANY, leaves_white=True, bic=-1.0)
+    assert _many_in([worse, best]) == [best] * is_begun_with
+
+
 NOTHING, MUCH_LEFT = (SimpleNamespace(is_nothing=one, is_by_speed=False) for one in (True, False))
 ORDINARY_SET = explanation(frozenset({"munk_moment", "actuator_lag"}))
 RARE_SET = explanation(frozenset({"munk_moment", "actuator_delay"}))
@@ -72,7 +85,7 @@ def explained(
     monkeypatch.setattr(module, "unknown_in", lambda one: [n for n in one.names if n.startswith("unknown_")])
     monkeypatch.setattr(module, "leanest", lambda _, best: best)
     fitter: Any = SimpleNamespace(base=None, root=None)
-    way: Any = SimpleNamespace(waves=waves, alone=())
+    way: Any = SimpleNamespace(waves=waves, outset=None, alone=())
     return module.explain(fitter, cast("Any", None), lambda _: None, way), was_for_few
 
 

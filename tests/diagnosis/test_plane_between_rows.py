@@ -15,7 +15,13 @@ from host.diagnosis.explain import explain
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.files import write_extended_model
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.plane_choice import _is_whole_likelier, by_single_effects, is_likelier, ways
+from host.diagnosis.plane_choice import (
+    _among_waves,
+    _is_whole_likelier,
+    by_single_effects,
+    is_likelier,
+    ways,
+)
 from host.diagnosis.sea_fits import with_waves
 from host.diagnosis.search import Search
 from host.diagnosis.seas import Explained
@@ -137,7 +143,7 @@ def test_what_the_plane_did_is_read_off_the_motion(way: Way) -> None:
 
 
 def test_among_waves_the_other_way_is_asked_with_waves_of_its_own() -> None:
-    first, second = ways([dive("moving", carried=0.02)])
+    first, second = _among_waves(ways([dive("moving", carried=0.02)]))
     assert first.waves is not None
     assert second.waves is not None
     assert NOTE in first.recordings[0].notes
@@ -220,7 +226,7 @@ def test_what_explains_most_alone_may_speak_against_the_base(monkeypatch: pytest
 
 def test_what_is_found_may_speak_against_the_first_choice(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("host.diagnosis.diagnose.ways", lambda recordings: ways(recordings)[::-1])
-    monkeypatch.setattr("host.diagnosis.diagnose.by_single_effects", lambda found, *_: found)
+    monkeypatch.setattr("host.diagnosis.diagnose.likelier_first", lambda found, *_: found)
     begun: list[tuple[Explanation | None, bool]] = []
     found_so: list[Explanation] = []
 

@@ -1,0 +1,73 @@
+"""All that every vehicle has, fitted before any effect is tried alone.
+
+The base equations bend so far to what a real vehicle has beside them that of its effects none alone says
+much, and the search that begins with each takes longest. All at once take no longer than two of them: where
+they leave nothing, it only has to be found which of them pay; where next to nothing, what acts beside them.
+"""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from host.catalogue import FAINT, ORDINARY
+from host.catalogue.nuisance import FREE_TRIM
+from host.diagnosis.explanation import Explanation, Names
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.margins import LITTLE, MUCH
+from host.diagnosis.starts import begun_beside, guess
+from host.diagnosis.together import together, with_more
+from host.diagnosis.whole_vehicle import is_real
+from host.gauss_newton import Point
+
+if TYPE_CHECKING:
+    from host.diagnosis.search import Search
+
+ALONG_THE_HULL = "drag_along_the_hull"  # beside drags that know no length, which it may stand for
+FAR_LESS = 0.1  # of what the root leaves
+PATIENT = 10  # iterations before a start is left that leads nowhere: the sides of such valleys are long
+
+
+def at_the_outset(fitter: Fitter) -> Explanation | None:
+    """The root with all that every vehicle has, where it leaves much and they white noise, or far less.
+
+    None where they do not.
+    """
+    left = fitter.excess(fitter.root.fit)
+    if left < MUCH:
+        return None
+    best = fitter.root
+    every = frozenset({FREE_TRIM.name, *ORDINARY, *FAINT})
+    for names in (every | {ALONG_THE_HULL}, every):
+        names |= {*fitter.tools_beside(names)}
+        for start in _starts(fitter, names):
+            found = fitter.explained(names, fitter.fitted([start], first=PATIENT))
+            if fitter.excess(found.fit) < LITTLE:
+                found = fitter.polished(found)
+                if found.leaves_white:
+                    return found
+            best = min(best, found, key=lambda e: e.bic)
+    return fitter.polished(best) if fitter.excess(best.fit) < FAR_LESS * left else None
+
+
+def goes_on_from(search: "Search", joint: Explanation) -> bool:
+    """Whether many of a set of many pay, or of what else promises to beside them: then no search need begin.
+
+    What pays is remembered. Of few, each alone tells more; and where too much is left, a leading effect may.
+    """
+    search.on_progress("what every vehicle has")
+    search.joint.add(joint.names)
+    found = together(search, search.root, with_more(search, search.remember(joint), least=0.0))
+    if found is not None and is_real(found.names):
+        return True
+    if search.steered is None:
+        search.joint.clear()  # beside what the search finds they are tried again
+    return False
+
+
+def _starts(fitter: Fitter, names: Names) -> Iterator[Point]:
+    """Beside the root and a linear hull, where what joins hardly acts, and by what a regression says."""
+    root, linear = (
+        begun_beside(fitter, Point(fit.structure, fit.parameters, fit.initial, fit.levels), names)
+        for fit in (fitter.root.fit, fitter.linear.fit)
+    )
+    yield from (root, linear)
+    yield guess(fitter, root, names)
