@@ -58,6 +58,8 @@ ORDINARY = (
 """What acts on every vehicle, strong or weak, beside an imperfect trim: the largest part first."""
 FAINT = ("heave_pitch_acceleration_coupling", "plane_in_cross_flow", "speed_independent_damping")
 """What every vehicle has, too, but too weak to be found before all that is ordinary is there."""
+ALONG_THE_HULL = "drag_along_the_hull"
+"""Of every long hull, but of no simulator that knows two drags only."""
 
 
 def named(name: str) -> Effect:

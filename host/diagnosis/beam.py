@@ -34,7 +34,7 @@ def beam_search(search: "Search") -> None:
         if size == 2 and _needs_many(search, beam[0], size):
             beam = _with_best_pair(search, beam)
         if foreign is None and _needs_many(search, beam[0], size):
-            joint = at_once(search, beam[0])
+            joint = at_once(search, beam)
             pair = _pair_instead(search, beam[0], joint) if size == 2 else None
             if pair is not None:
                 beam, postponed = [pair], joint
@@ -61,7 +61,7 @@ def beam_search(search: "Search") -> None:
         if size == enough:
             foreign = lone_form(search, leading)
             if foreign is not None and foreign.names & WANDERING:
-                joint = at_once(search, leading)
+                joint = at_once(search, [leading])
                 pair = _pair_instead(search, leading, joint)
                 if pair is not None:
                     beam, postponed = [pair], joint

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.catalogue import named, structure_of
+from host.catalogue import ALONG_THE_HULL, named, structure_of
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import first_guess
 from host.diagnosis.margins import LITTLE, NAMING_MARGIN
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
     from host.diagnosis.search import Search
 
-ALONG_THE_HULL = "drag_along_the_hull"  # of every long hull, but of no simulator that knows two drags only
 STAGES = tuple(10.0 ** (-k / 2) for k in range(1, 17))
 """Variance of the unknown force over that of all force."""
 UNDECIDED = 4  # stages, through which sets with an effect that gains at the first are followed side by side

@@ -8,22 +8,21 @@ they leave nothing, it only has to be found which of them pay; where next to not
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from host.catalogue import FAINT, ORDINARY
+from host.catalogue import ALONG_THE_HULL, FAINT, ORDINARY
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import LITTLE, MUCH
+from host.diagnosis.pruning import pruned
 from host.diagnosis.starts import begun_beside, guess
-from host.diagnosis.together import together, with_more
-from host.diagnosis.whole_vehicle import is_real
+from host.diagnosis.together import with_more
+from host.diagnosis.whole_vehicle import ended, is_real
 from host.gauss_newton import Point
 
 if TYPE_CHECKING:
     from host.diagnosis.search import Search
 
-ALONG_THE_HULL = "drag_along_the_hull"  # beside drags that know no length, which it may stand for
 FAR_LESS = 0.1  # of what the root leaves
-PATIENT = 10  # iterations before a start is left that leads nowhere: the sides of such valleys are long
 
 
 def at_the_outset(fitter: Fitter) -> Explanation | None:
@@ -39,11 +38,9 @@ def at_the_outset(fitter: Fitter) -> Explanation | None:
     for names in (every | {ALONG_THE_HULL}, every):
         names |= {*fitter.tools_beside(names)}
         for start in _starts(fitter, names):
-            found = fitter.explained(names, fitter.fitted([start], first=PATIENT))
-            if fitter.excess(found.fit) < LITTLE:
-                found = fitter.polished(found)
-                if found.leaves_white:
-                    return found
+            found = ended(fitter, start, names)
+            if fitter.excess(found.fit) < MUCH and found.leaves_white:
+                return found
             best = min(best, found, key=lambda e: e.bic)
     return fitter.polished(best) if fitter.excess(best.fit) < FAR_LESS * left else None
 
@@ -51,15 +48,15 @@ def at_the_outset(fitter: Fitter) -> Explanation | None:
 def goes_on_from(search: "Search", joint: Explanation) -> bool:
     """Whether many of a set of many pay, or of what else promises to beside them: then no search need begin.
 
-    What pays is remembered. Of few, each alone tells more; and where too much is left, a leading effect may.
+    What pays is remembered. Of few, each alone tells more; and where something is left, a leading effect may.
     """
     search.on_progress("what every vehicle has")
     search.joint.add(joint.names)
-    found = together(search, search.root, with_more(search, search.remember(joint), least=0.0))
-    if found is not None and is_real(found.names):
+    joint = with_more(search, search.remember(joint), least=0.0)
+    is_all = joint.leaves_white or search.fitter.excess(joint.fit) < LITTLE
+    if is_all and is_real(pruned(search, joint).names):
         return True
-    if search.steered is None:
-        search.joint.clear()  # beside what the search finds they are tried again
+    search.joint.clear()  # beside what the search finds they are tried again
     return False
 
 

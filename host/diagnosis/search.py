@@ -52,8 +52,7 @@ class Search:
     asks_drift  whether something may drift beside white noise; `adrift` a set beside that, where it is plain
     is_second  it was all searched with the plane the other way, too, where no continuation helped
     outset  the root with all that every vehicle has, where that leaves nothing, or next to nothing
-    instead  whether something else explains the recordings: asked where a dozen effects leave much
-    is_needless  it does, so no more is made of what was tried
+    instead  whether something else explains all, asked where a dozen effects leave much; `is_needless` if so
     """
 
     fitter: Fitter
@@ -90,8 +89,7 @@ class Search:
             return found if self.part is not None else told_by_the_usual(self, whole(self, found))
         if self.outset is not None and goes_on_from(self, self.outset):
             return self._concluded()
-        if not self.is_led_elsewhere:
-            beam_search(self)
+        beam_search(self)
         if self.is_led_elsewhere:
             return min((e for e in self.tried.values() if FREE_TRIM.name not in e.names), key=lambda e: e.bic)
         return with_best_offsets(self) if self.is_needless else self._concluded()

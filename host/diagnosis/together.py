@@ -20,6 +20,7 @@ from host.diagnosis.margins import FEW, LITTLE, MUCH, SMALL, margin
 from host.diagnosis.pruning import pruned
 from host.diagnosis.starts import is_far
 from host.diagnosis.trims import retrimmed
+from host.diagnosis.whole_vehicle import all_beside
 from host.diagnosis.workers import Task
 from host.gauss_newton import Point
 from host.valleys import look_alikes
@@ -31,12 +32,28 @@ MOST_BESIDE = 3  # effects beside those that every vehicle has
 HARDLY_LESS = 0.95  # of what is left over the noise floor: another effect beside so many leads nowhere
 
 
-def at_once(search: "Search", leading: Explanation) -> Explanation:
-    """The leading set with all that every vehicle has, and what else promises most where little is left."""
+def at_once(search: "Search", leading: list[Explanation]) -> Explanation:
+    """The leading set with all that every vehicle has, and what else promises most where little is left.
+
+    In one fit, where that leaves little; else each joins the first of them, one after the other.
+    """
     search.on_progress("what every vehicle has")
-    fitter, best = search.fitter, _with_few_more(search, with_ordinary(search, leading))
+    fitter, found = search.fitter, _in_one_fit(search, leading)
+    if found is not None and found.leaves_white:
+        return found
+    best = _with_few_more(search, with_ordinary(search, leading[0]) if found is None else found)
     if fitter.excess(best.fit) > LITTLE and (alike := _among_look_alikes(search, best)) is not best:
         best = _with_few_more(search, alike)
+    return best
+
+
+def _in_one_fit(search: "Search", leading: list[Explanation]) -> Explanation | None:
+    """The likeliest of these sets with all that every vehicle has, where it leaves less than much."""
+    found = [search.remember(e) for e in search.workers.results([(all_beside, (one,)) for one in leading])]
+    best = min(found, key=lambda e: e.bic)
+    if search.fitter.excess(best.fit) > MUCH:
+        return None
+    search.joint.add(best.names)
     return best
 
 

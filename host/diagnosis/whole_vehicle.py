@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import chi2
 
-from host.catalogue import BY_NAME, FAINT, ORDINARY
+from host.catalogue import ALONG_THE_HULL, BY_NAME, FAINT, ORDINARY
 from host.catalogue.nuisance import SPEED_CORRECTION
 from host.diagnosis.explanation import Explanation, Names
-from host.diagnosis.margins import margin
+from host.diagnosis.margins import MUCH, margin
 from host.diagnosis.pruning import pruned
 from host.diagnosis.starts import begun_beside
 from host.gauss_newton import Point
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from host.diagnosis.fitter import Fitter
     from host.diagnosis.search import Search
 
+PATIENT = 10  # iterations before a start is left that leads nowhere: the sides of such valleys are long
 MOST_ROUNDS = 3  # as more names see other valleys
 BY_CHANCE = 1e-3
 SHOWN = 2  # of the effects that every vehicle has: one that shows so many is no textbook's
@@ -67,6 +68,23 @@ def with_all_ordinary(fitter: "Fitter", parent: Explanation) -> Explanation:
     here = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
     starts = [begun_beside(fitter, start, names) for start in (here, *look_alikes(here))]
     return fitter.polished(fitter.explained(names, fitter.fitted(starts)))
+
+
+def all_beside(fitter: "Fitter", leading: Explanation) -> Explanation:
+    """The set with all that every vehicle has, and drag that acts along the hull, in one fit.
+
+    Begun where they hardly act yet; not carried to its end where much is left.
+    """
+    fit, names = leading.fit, leading.names | {*ORDINARY, *FAINT, ALONG_THE_HULL}
+    names |= {*fitter.tools_beside(names)}
+    start = begun_beside(fitter, Point(fit.structure, fit.parameters, fit.initial, fit.levels), names)
+    return ended(fitter, start, names)
+
+
+def ended(fitter: "Fitter", start: Point, names: Names) -> Explanation:
+    """A set of many from this start, polished where it leaves little."""
+    found = fitter.explained(names, fitter.fitted([start], first=PATIENT))
+    return fitter.polished(found) if fitter.excess(found.fit) < MUCH else found
 
 
 def beside_all(fitter: "Fitter", found: Explanation) -> Explanation | None:

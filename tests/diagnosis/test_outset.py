@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from hidden_dive import hidden_dive
 
-from host.catalogue import ORDINARY
+from host.catalogue import ALONG_THE_HULL, ORDINARY
 from host.diagnosis import outset, plane_choice
 from host.diagnosis import search as module
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import LITTLE, MUCH
-from host.diagnosis.outset import ALONG_THE_HULL, FAR_LESS, at_the_outset
+from host.diagnosis.outset import FAR_LESS, at_the_outset
 from host.diagnosis.plane_choice import Way, likelier_first
 from host.diagnosis.search import Search
 from host.diagnosis.workers import Workers
@@ -72,36 +72,33 @@ def test_what_no_vehicle_has_by_itself_is_searched_for_alone() -> None:
 
 
 @pytest.mark.parametrize(
-    ("pays", "is_led", "said"),
+    ("pays", "left", "said"),
     [
-        (MANY, False, ["concluded"]),
-        (FEW, False, ["singles", "concluded"]),
-        (None, False, ["singles", "concluded"]),
-        (None, True, []),
+        (MANY, 1.3, ["concluded"]),  # of white noise, whose size the sensors show too small
+        (MANY, 1.1, ["concluded"]),
+        (FEW, 1.0, ["singles", "concluded"]),
+        (MANY, 1.4, ["singles", "concluded"]),
     ],
-    ids=["many", "few", "too much left", "something drifts"],
+    ids=["white", "little", "few", "something left"],
 )
 def test_a_search_goes_on_with_many_or_begins_with_single_effects(
-    pays: frozenset[str] | None, is_led: bool, said: list[str], monkeypatch: pytest.MonkeyPatch
+    pays: frozenset[str], left: float, said: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def found(names: frozenset[str]) -> Any:
-        return SimpleNamespace(names=names, bic=0.0, lean=lambda: found(names))
-
-    def together(search: Search, *_: Any) -> Any:
-        search.adrift = found(MANY) if is_led else None
-        return None if pays is None else found(pays)
+        fit, white = SimpleNamespace(left=left), left == 1.3
+        return SimpleNamespace(names=names, bic=0.0, fit=fit, leaves_white=white, lean=lambda: found(names))
 
     calls: list[str] = []
     monkeypatch.setattr(outset, "with_more", lambda _, best, **__: best)
-    monkeypatch.setattr(outset, "together", together)
+    monkeypatch.setattr(outset, "pruned", lambda *_: found(pays))
     monkeypatch.setattr(module, "beam_search", lambda _: calls.append("singles"))
     monkeypatch.setattr(Search, "_concluded", lambda _: calls.append("concluded"))
-    nothing: Any = cast("Any", None)
+    fitter: Any = SimpleNamespace(excess=lambda fit: fit.left)
     root, base = found(frozenset({"free_trim"})), found(frozenset())
-    search = Search(nothing, nothing, lambda _: None, base, root, outset=found(MANY))
+    search = Search(fitter, cast("Any", None), lambda _: None, base, root, outset=found(MANY))
     search.run()
     assert calls == said
-    assert bool(search.joint) is (pays is MANY)
+    assert bool(search.joint) is (said == ["concluded"])
 
 
 def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> None:

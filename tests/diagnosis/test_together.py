@@ -11,6 +11,7 @@ from hidden_dive import BASE, hidden_dive
 from host.catalogue import structure_of
 from host.diagnosis import together as module
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.margins import MUCH
 from host.diagnosis.search import Search
 from host.diagnosis.together import at_once, completed, together
 from host.diagnosis.workers import Workers
@@ -39,6 +40,7 @@ class Rounds:
         self.leading = SimpleNamespace(names=frozenset({0}), fit=20.0, bic=0.0)
         self.continued = 0
         self.asks_drift, self.adrift, self.is_second = False, None, False
+        patch.setattr(module, "_in_one_fit", lambda *_: None)
         patch.setattr(module, "with_ordinary", lambda search, _: search.sets[0])
         patch.setattr(module, "_among_look_alikes", lambda _, best: best)
         patch.setattr(module, "_by_continuation", Rounds._continued)
@@ -63,8 +65,35 @@ class Rounds:
 
 
 def found(search: Rounds) -> Any:
-    joint = at_once(search, search.leading)  # type: ignore[arg-type]
+    joint = at_once(search, [search.leading])  # type: ignore[arg-type]
     return together(search, search.leading, joint)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("left", "is_white", "comes_of"),
+    [(1.1, True, "one fit"), (1.6, False, "one fit and more"), (2.4, False, "one after the other")],
+)
+def test_all_join_the_likeliest_in_one_fit_where_that_leaves_little(
+    left: float, is_white: bool, comes_of: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search = Rounds([9.0], True, monkeypatch)
+    sets = [
+        SimpleNamespace(names=frozenset({k}), fit=left, bic=bic, leaves_white=is_white)
+        for k, bic in enumerate([-1.0, -3.0, -2.0])
+    ]
+    asked: list[str] = []
+    monkeypatch.undo()
+    monkeypatch.setattr(module, "with_ordinary", lambda _, one: asked.append("one after the other") or one)
+    monkeypatch.setattr(module, "with_more", lambda _, one: asked.append("more") or one)
+    monkeypatch.setattr(module, "_among_look_alikes", lambda _, best: best)
+    monkeypatch.setattr(search, "remember", lambda one: one, raising=False)
+    monkeypatch.setattr(search.workers, "results", lambda _: sets)
+    leading: Any = [sets[0], sets[2]]
+    best = at_once(search, leading)  # type: ignore[arg-type]
+    assert best is (sets[0] if comes_of == "one after the other" else sets[1])
+    expected = {"one fit": [], "one fit and more": ["more"], "one after the other": ["one after the other"]}
+    assert asked == expected[comes_of]
+    assert (sets[1].names in search.joint) is (left < MUCH)
 
 
 def test_another_effect_that_takes_hardly_anything_away_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
