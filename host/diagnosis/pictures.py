@@ -130,8 +130,8 @@ def slots_picture(found: Diagnosis) -> str:
     if best and best[-1][1] > 20.0 * best[0][1]:
         right.set_xscale("log")
         right.xaxis.set_minor_formatter(NullFormatter())
-    how = "alone" if found.is_ranked_alone else "beside the others"
-    right.set_xlabel(f"gain in the information criterion, {how} (red: in the answer)")
+    alone = "gain in the information criterion, alone (red: in the answer)"
+    right.set_xlabel(alone if found.is_ranked_alone else "loss in the information criterion without it")
     for axis in (left, right):
         axis.grid(axis="y", visible=False)
         axis.set_axisbelow(True)

@@ -52,6 +52,7 @@ def write_report(answer: Answer, vehicle: str, path: Path) -> None:
         held_out=found.is_held_out,
         horizon=found.horizon,
         is_carried=found.has_sea and found.is_held_out and found.horizon is None,
+        is_ranked_alone=found.is_ranked_alone,
         is_adrift=found.extended.fit.has_coloured_noise and found.is_held_out,
         proof=_proof(answer),
         remaining=found.remaining,

@@ -29,6 +29,15 @@ def test_twins_are_shown_with_the_manoeuvre_that_decides(coupled: Diagnosis, tmp
     assert "http" not in shown.replace("http-equiv", "")
 
 
+@pytest.mark.parametrize(("is_alone", "told"), [(True, "alone would improve"), (False, "lost without each")])
+def test_it_is_said_by_what_effects_are_ranked(
+    coupled: Diagnosis, tmp_path: Path, is_alone: bool, told: str
+) -> None:
+    assert coupled.is_ranked_alone
+    shown = page(Answer(found=replace(coupled, is_ranked_alone=is_alone)), tmp_path)
+    assert told in shown
+
+
 def test_nothing_missing_shows_no_shares(coupled: Diagnosis, tmp_path: Path) -> None:
     slots = dict.fromkeys(coupled.slots, 0.0)
     calm = replace(coupled, verdict="no_mismatch", effects=[], slots=slots, extended=coupled.base)

@@ -11,13 +11,13 @@ from hidden_dive import hidden_dive
 from host.catalogue import ALONG_THE_HULL, ORDINARY
 from host.diagnosis import outset, plane_choice
 from host.diagnosis import search as module
+from host.diagnosis.diagnose import diagnose
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import LITTLE, MUCH
 from host.diagnosis.outset import FAR_LESS, at_the_outset
 from host.diagnosis.plane_choice import Way, likelier_first
 from host.diagnosis.search import Search
-from host.diagnosis.workers import Workers
 from host.read_recordings import read_recordings
 from host.recording import Array
 from host.vehicle import default_vehicle
@@ -130,12 +130,13 @@ def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> N
     assert order(moved, held) == [1, 0]
 
 
-def test_it_is_searched_with(real: Fitter) -> None:
+def test_a_diagnosis_begins_with_it_and_ranks_what_pays(real: Fitter) -> None:
     said: list[str] = []
-    with Workers(real, 1) as workers:
-        search = Search(real, workers, said.append, real.base, real.root, outset=at_the_outset(real))
-        found = search.run()
-    assert "heave_pitch_rate_coupling" in found.names
-    assert "munk_moment" not in found.names  # which this simulator has not
+    found = diagnose(real.recordings, said.append)
+    named = [effect.name for effect in found.effects]
     assert not any(line.startswith("1 effect") for line in said)
-    assert real.excess(found.fit) < LITTLE
+    assert found.verdict == "explained"
+    assert "heave_pitch_rate_coupling" in named
+    assert "munk_moment" not in named  # which this simulator has not
+    assert not found.is_ranked_alone
+    assert [name for name, _ in found.ranking] == named
