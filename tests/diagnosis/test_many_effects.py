@@ -35,6 +35,7 @@ def test_six_effects_at_once_are_named_with_their_sizes() -> None:
         assert abs(value - truth) < 4.0 * std + 0.02 * abs(truth), name
 
 
+@pytest.mark.long
 def test_a_recording_that_begins_as_the_plane_is_put_over_names_no_more_than_the_servo(
     tmp_path: Path,
 ) -> None:
