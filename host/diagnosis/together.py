@@ -174,7 +174,7 @@ def _more(search: "Search", best: Explanation) -> list[Task]:
     gains, is_done = search.gains(best), best.leaves_white
     least = margin(best) + log(best.fit.samples) if is_done else -inf
     promising = sorted(gains, key=lambda name: -gains[name])[:FEW]
-    tasks = [search.growth(best, name) for name in promising if gains[name] > least]
+    tasks = [search.growth(best, name) for name in promising if gains[name] >= least]
     if FREE_TRIM.name in best.names and not is_done:
         tasks += [(retrimmed, (best, frozenset({name}))) for name in OFFSETS]
     return tasks
