@@ -61,8 +61,8 @@ class NamedEffect:
 class Diagnosis:
     """What `mils diagnose` found; the fits are those over all the recordings.
 
-    ranking  effects by the BIC each takes off alone, the best first; where none was tried alone, those that
-             are named, by what each is worth beside the others
+    ranking  effects by the BIC each takes off alone, the best first; where they were not tried alone, those
+             that are named, by what each is worth beside the others
     """
 
     verdict: Verdict
@@ -172,6 +172,7 @@ def _diagnosed(
     effects = [_with_coefficients(effect, values, std) for effect in judged.effects]
     errors = free_run_errors(base, longest)
     alone = max(_ranking(search), ranking, key=len)
+    is_ranked_alone = len(alone) >= len(effects)
     told = remaining(judged.verdict, best, left, judged.after, evidence(waves))
     return Diagnosis(
         verdict=judged.verdict,
@@ -187,8 +188,8 @@ def _diagnosed(
         slots=judged.slots,
         location=locate(longest, errors, floor, values["u0"]),
         force=unknown_force(longest, {n: values[n] for n in NAMES}, floor, fitter.accelerations),
-        ranking=alone or [(effect.name, effect.delta_bic) for effect in effects],
-        is_ranked_alone=bool(alone),
+        ranking=alone if is_ranked_alone else [(effect.name, effect.delta_bic) for effect in effects],
+        is_ranked_alone=is_ranked_alone,
         remaining=" ".join([told, *_unnamed(best, waves), *_other_answers(found)]),
         has_sea=best.fit.has_process_noise,
         bic=best.bic,

@@ -130,6 +130,7 @@ def test_what_a_few_explain_among_waves_needs_no_continuation(is_for_few: bool) 
     )
     assert _needs_many(search, one, 2)
     assert _is_explained_otherwise(search, one) is is_for_few
+    assert search.is_needless is is_for_few
 
 
 @pytest.mark.parametrize("is_pushed", [False, True])

@@ -311,6 +311,34 @@ def test_two_that_leave_far_less_than_a_dozen_are_gone_on_with(
     assert _pair_instead(search, one, nothing_left) is None
 
 
+@pytest.mark.parametrize(("waves_do", "ends"), [(True, "as it is"), (False, "concluded")])
+def test_a_search_that_waves_make_needless_is_not_concluded(
+    waves_do: bool, ends: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def leaving(left: float, *names: str) -> Any:
+        one = SimpleNamespace(names=frozenset(names), fit=left, bic=10.0 * left, leaves_white=False)
+        one.lean = lambda: one
+        return one
+
+    done: list[str] = []
+    root, single = leaving(20.0, "free_trim"), leaving(10.0, "free_trim", "actuator_lag")
+    monkeypatch.setattr(module, "grown", lambda search, *_: [search.remember(single)])
+    monkeypatch.setattr(beam, "grown", lambda *_: [])
+    monkeypatch.setattr(beam, "_needs_many", lambda search, _, size: size == 2 and not search.joint)
+    monkeypatch.setattr(beam, "_with_best_pair", lambda _, sets: sets)
+    monkeypatch.setattr(beam, "_most_without_form", lambda *_: None)
+    monkeypatch.setattr(beam, "margin", lambda _: 6.0)
+    monkeypatch.setattr(beam, "with_offset", lambda _, sets: sets)
+    monkeypatch.setattr(beam, "at_once", lambda *_: leaving(9.0))
+    monkeypatch.setattr(beam, "together", lambda *_: done.append("continuation") or single)
+    monkeypatch.setattr(module, "with_best_offsets", lambda _: done.append("as it is"))
+    monkeypatch.setattr(Search, "_concluded", lambda _: done.append("concluded"))
+    fitter: Any = SimpleNamespace(excess=lambda left: left)
+    search = Search(fitter, cast("Any", None), lambda _: None, leaving(30.0), root, instead=lambda: waves_do)
+    search.run()
+    assert done == ([ends] if waves_do else ["continuation", ends])
+
+
 @pytest.mark.parametrize(
     ("form", "pair_leaves", "asked"),
     [
