@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from host.catalogue import UNKNOWN, named
 from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import WANDERING
+from host.diagnosis.candidates import candidates
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.lone_form import lone_form
 from host.diagnosis.margins import FEW, LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN, SMALL, margin
@@ -161,7 +162,7 @@ def _promising(search: "Search", parent: Explanation, size: int, is_leading: boo
     against its own coefficients, would gain once all of them are free; so until little is left these
     are always tried, unless all at once.
     """
-    others = search.candidates(parent)
+    others = candidates(search, parent)
     if size == 1 and not search.root.fit.has_process_noise:
         return others
     gains = search.gains(parent, is_leading)

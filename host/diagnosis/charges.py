@@ -4,7 +4,7 @@ from math import log
 
 import numpy as np
 
-from host.catalogue import UNKNOWN, named
+from host.catalogue import CHANGES, UNKNOWN, named
 from host.diagnosis.explanation import Names
 from host.fit import Fit
 from host.recording import Recording
@@ -13,6 +13,7 @@ from host.valleys import log_prior
 RARITY = 1.0  # of BIC, against what not every vehicle has: decides between exact twins
 FOREIGN = 8.0  # of BIC, against each form of unknown physics: odds of 50 to 1 for an entry as likely
 LONELY = 8.0  # of BIC, against what seldom acts without another effect that is not there: odds of 50 to 1
+UNNOTED = 6.0  # of BIC, against each change that nobody noted, but of the two that most often come
 AT_AN_END, HARDLY_CHANGES = 2.0, 8.0  # s; of BIC: what changed there all but acts always, or never
 LEAST_COUPLING, MOST_COUPLING, COUPLING_SPREAD = 0.0, 0.8, 0.2  # of the forward speed
 
@@ -21,9 +22,9 @@ def charged_bic(fit: Fit, names: Names, coefficients: int, longest: Recording) -
     """Bayesian information criterion of a fit with so many free coefficients of effects; lower is better.
 
     Charged as well: a speed, a damping or a coupling that is hardly likely, what not every vehicle has, or
-    not by itself, or what the catalogue does not hold, a change as the recording begins or ends, and the
-    choice among all the periods that an oscillation could have had. Not charged: what beside an effect's
-    other coefficients makes no difference on this recording.
+    not by itself, or what the catalogue does not hold, a change as the recording begins or ends, or of what
+    seldom changes and nobody noted, and the choice among all the periods that an oscillation could have had.
+    Not charged: what beside an effect's other coefficients makes no difference on this recording.
 
     longest  of the recordings, which tells most periods apart
     """
@@ -31,7 +32,9 @@ def charged_bic(fit: Fit, names: Names, coefficients: int, longest: Recording) -
     unlikely = -2.0 * log_prior(fit) + _strange_coupling(fit) + FOREIGN * len(names & UNKNOWN.keys())
     chosen = sum(2.0 * log(_periods_within(named(name).periods, longest)) for name in names)
     lonely = sum(not {named(name).beside} <= names | {None} for name in names)
-    seldom = RARITY * rare + LONELY * lonely + HARDLY_CHANGES * _changes_at_an_end(fit, longest)
+    unnoted = 0 if longest.alarms else len(names & {change.name for change in CHANGES})
+    seldom = RARITY * rare + LONELY * lonely + UNNOTED * unnoted
+    seldom += HARDLY_CHANGES * _changes_at_an_end(fit, longest)
     told = coefficients - _untold(fit, names)
     return fit.bic + told * log(fit.samples) + seldom + unlikely + chosen
 

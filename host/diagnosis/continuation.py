@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.catalogue import ALONG_THE_HULL, named, structure_of
+from host.diagnosis.candidates import candidates
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import first_guess
 from host.diagnosis.margins import LITTLE, NAMING_MARGIN
@@ -174,7 +175,7 @@ def _is_near(one: Explanation, best: Explanation, most: float) -> bool:
 def _larger(search: "Search", parent: Explanation, most: int) -> list[Explanation]:
     """The set with one effect more, of those that promise most under these forces."""
     # What a free run made of an effect alone is no start here, so each is foretold from its own probes.
-    names = search.candidates(parent)
+    names = candidates(search, parent)
     ahead = search.workers.results([(gain, (parent, name, [], True)) for name in names])
     gains = dict(zip(names, ahead, strict=True))
     names = sorted(gains, key=lambda name: -gains[name])[:most]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from host.catalogue import BY_NAME, UNKNOWN, named
+from host.diagnosis.candidates import eligible
 from host.diagnosis.deviations import deviations
 from host.diagnosis.exchange import twins
 from host.diagnosis.explain import explain
@@ -282,7 +283,7 @@ def _slots(
 
 def _ranking(search: Search) -> Ranking:
     """What each effect alone improves the information criterion by, best first."""
-    alone = [(effect.name, search.gain_alone(effect.name)) for effect in search.fitter.candidates]
+    alone = [(effect.name, search.gain_alone(effect.name)) for effect in eligible(search)]
     return sorted((pair for pair in alone if pair[1] > -inf), key=lambda pair: -pair[1])
 
 

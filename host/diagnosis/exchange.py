@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from host.catalogue import BY_NAME, ORDINARY, named
 from host.catalogue.kin import OFFSETS, PITCHING_INTO_DEPTH, both_come, measure_alike
+from host.diagnosis.candidates import eligible
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import FEW, LARGEST_SET, NAMING_MARGIN, SMALL, TWIN_MARGIN, margin
@@ -32,7 +33,7 @@ def exchanged(search: "Search", best: Explanation, settled: Names = frozenset())
     is_small, is_large = len(best.names) <= SMALL, len(best.names) > LARGEST_SET
     for smaller in fewer:
         (member,) = best.names - smaller.names
-        kin = {e.name for e in search.fitter.candidates if _is_kin(search, e.name, member)}
+        kin = {e.name for e in eligible(search) if _is_kin(search, e.name, member)}
         # In a large set a rare member may stand for a common one that joined too late.
         fair = kin if named(member).is_common else kin | {*ORDINARY}
         gains = search.gains(smaller, is_small, fair if is_large else None)

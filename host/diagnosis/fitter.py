@@ -58,7 +58,7 @@ class Fitter:
     thinned  the recordings for what takes errors for normal
     speed_errors  how those of a measured speed make depth drift, where that matters
     wander   (3, 2) of what else drifts (host.drift), variances in units of the white noise: as in `known`
-    candidates  entries of the catalogue that are tried: what changes at one moment after an alarm only
+    candidates  entries that are tried: what changes at one moment only after an alarm, or as `eligible` tells
     """
 
     def __init__(self, recordings: list[Recording], known: Explanation | None = None) -> None:

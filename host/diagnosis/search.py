@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 from math import inf
 
 from host.catalogue import named
-from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.absence import promises_more
 from host.diagnosis.beam import beam_search, grown
+from host.diagnosis.candidates import candidates, other_changes
 from host.diagnosis.exchange import exchanged, twins
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
@@ -117,10 +117,13 @@ class Search:
         return best if best is found else with_likeliest_offsets(self, best)
 
     def singles(self) -> list[Explanation]:
-        """Each effect alone on top of the root."""
+        """Each effect alone on top of the root; what else may change, where the likeliest is a change."""
         if self.alone:
             return [self.remember(explanation) for explanation in self.alone]
-        return grown(self, [self.remember(self.root)], 1)
+        found = grown(self, [self.remember(self.root)], 1)
+        if tasks := [self.growth(self.root, name) for name in other_changes(self)]:
+            found += [self.remember(explanation) for explanation in self.workers.results(tasks)]
+        return found
 
     def alone_so_far(self) -> tuple[Explanation, ...]:
         """Each effect alone on top of the root, as far as these were fitted."""
@@ -172,7 +175,7 @@ class Search:
         self, parent: Explanation, is_thorough: bool = True, among: set[str] | None = None
     ) -> dict[str, float]:
         """Twice the log-likelihood each effect could gain on top of the parent, predicted."""
-        others = [name for name in self.candidates(parent) if among is None or name in among]
+        others = [name for name in candidates(self, parent) if among is None or name in among]
         found = self.workers.results(
             [(gain, (parent, name, self.values(name), is_thorough)) for name in others]
         )
@@ -284,17 +287,3 @@ class Search:
     def is_hopeless(self, best: Explanation) -> bool:
         """Whether much is left although all that every vehicle has was tried at once."""
         return bool(self.joint) and self.fitter.excess(best.fit) > MUCH
-
-    def candidates(self, parent: Explanation) -> list[str]:
-        """What may join a set: the offsets only once the free trim, which does their work, has gone.
-
-        What changes other terms joins these; and what is no physics, where it matters (Fitter.tools_beside).
-        """
-        barred = {*parent.names, *(OFFSETS if FREE_TRIM.name in parent.names else ())}
-        candidates = [
-            effect.name
-            for effect in self.fitter.candidates
-            if effect.name not in barred and (not effect.changes or parent.names & {*effect.changes})
-        ]
-        tools = self.fitter.tools_beside(parent.names)
-        return candidates + [name for name in tools if name not in parent.names]

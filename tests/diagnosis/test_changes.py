@@ -1,17 +1,21 @@
-"""What changed at a moment that is known roughly: the part around it, and the name and size of the change."""
+"""What changed at one moment, known roughly or not: the part around it, the name and size of the change."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hidden_dive import BASE, Extra, hidden_dive
+from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import CATALOGUE, CHANGES, structure_of
 from host.catalogue.moments import LAST
 from host.diagnosis.around import around, around_alarm
+from host.diagnosis.candidates import eligible
 from host.diagnosis.diagnose import diagnose
+from host.diagnosis.exchange import exchanged
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.search import Search
 from host.diagnosis.spans import divide
+from host.diagnosis.workers import Workers
 from host.errors import RecordingError
 from host.propagate import free_run, inputs_of
 from host.recording import Array
@@ -31,17 +35,35 @@ def slower(time: float, x: Array, plane: float) -> tuple[float, float, float]:
     return heave, pitch, -BASE["u0"] * lost * x[2]
 
 
+def water(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+    return 0.0, 0.0, 0.12 * (time > WHEN)
+
+
+def slipped(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+    zero = 0.03 * (time > WHEN)
+    return BASE["b1"] * zero, BASE["b2"] * zero, 0.0
+
+
+NAMED = {
+    "trim": (trim, "trim_moment_change", "c_qb", 0.05),
+    "slower": (slower, "speed_change", "speed_step", -0.1),
+    "water": (water, "current_change", "current_step", 0.12),
+    "slipped": (slipped, "rudder_offset_change", "rudder_step", 0.03),
+}
+
+
 @pytest.mark.parametrize(
-    ("extra", "name", "parameter", "size"),
+    ("what", "alarms"),
     [
-        pytest.param(trim, "trim_moment_change", "c_qb", 0.05, id="trim", marks=pytest.mark.long),
-        pytest.param(slower, "speed_change", "speed_step", -0.1, id="slower"),
+        pytest.param("trim", (), id="trim"),
+        *(pytest.param(what, (), marks=pytest.mark.long, id=what) for what in [*NAMED][1:]),
+        pytest.param("trim", (TOLD,), marks=pytest.mark.long, id="trim, alarm"),
+        pytest.param("slower", (TOLD,), marks=pytest.mark.long, id="slower, alarm"),
     ],
 )
-def test_what_changed_is_named_with_its_size_and_its_moment(
-    extra: Extra, name: str, parameter: str, size: float
-) -> None:
-    found = diagnose([replace(hidden_dive(extra, seed=4, duration=120.0), alarms=(TOLD,))])
+def test_what_changed_is_named_with_its_size_and_its_moment(what: str, alarms: tuple[float, ...]) -> None:
+    extra, name, parameter, size = NAMED[what]
+    found = diagnose([replace(hidden_dive(extra, seed=4, duration=90.0), alarms=alarms)])
     assert found.verdict == "explained"
     (effect,) = found.effects
     assert effect.name == name
@@ -49,6 +71,36 @@ def test_what_changed_is_named_with_its_size_and_its_moment(
     assert abs(value - size) < 4.0 * std
     moment, std, _ = effect.coefficients[f"{name}_time"]
     assert abs(moment - WHEN) < max(4.0 * std, 0.2)
+
+
+@pytest.mark.long
+def test_a_pitch_sensor_that_is_knocked_is_named_without_an_alarm() -> None:
+    dive = hidden_dive(seed=4, duration=120.0)
+    found = diagnose([replace(dive, pitch=dive.pitch + 0.05 * (dive.time > WHEN))])
+    assert [effect.name for effect in found.effects] == ["pitch_bias_change"]
+
+
+def test_a_change_that_shows_has_all_others_tried() -> None:
+    fitter = Fitter([hidden_dive(trim, seed=4, duration=80.0)])
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        assert eligible(search) == CATALOGUE
+        search.remember(fitter.grown(fitter.root, "actuator_lag", []))
+        assert eligible(search) == CATALOGUE
+        ballast = search.remember(fitter.grown(fitter.root, "ballast_change", []))
+        assert eligible(search) == (*CATALOGUE, *CHANGES)
+        exchanged(search, ballast)
+        likeliest = min(search.tried.values(), key=lambda e: e.bic)
+        assert "trim_moment_change" in likeliest.names
+
+
+def test_a_change_that_nobody_noted_is_charged() -> None:
+    dive = hidden_dive(trim, seed=4, duration=60.0)
+    noted = Fitter([replace(dive, alarms=(50.0,))])
+    unnoted = Fitter([dive], known=noted.base)
+    for name, charge in (("trim_moment_change", 6.0), ("ballast_change", 0.0)):
+        one = noted.grown(noted.root, name, [])
+        assert unnoted.bic(one.fit, one.names) - one.bic == pytest.approx(charge)
 
 
 def test_nothing_is_said_to_have_changed_after_a_false_alarm() -> None:

@@ -56,6 +56,7 @@ def damping(_: float, x: Array, __: float) -> tuple[float, float, float]:
     return 0.0, -8.0 * float(x[1] * abs(x[1])), 0.0
 
 
+@pytest.mark.long
 def test_physics_is_named_beside_sensors_that_wander(tmp_path: Path) -> None:
     found = diagnose([with_wandering_sensors(damping)])
     assert [effect.name for effect in found.effects] == ["pitch_quadratic_damping"]

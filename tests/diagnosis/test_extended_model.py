@@ -47,6 +47,7 @@ def score(model: Path, recording: Path, tmp_path: Path) -> dict[str, float]:
     return found
 
 
+@pytest.mark.long
 def test_the_extended_model_beats_the_base_on_another_voyage(tmp_path: Path) -> None:
     learnt, other = voyage(tmp_path, 1), voyage(tmp_path, 2)
     assert main(["identify", str(learnt), "--out", str(tmp_path), "--quiet"]) in (0, 1)

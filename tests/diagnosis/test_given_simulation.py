@@ -156,6 +156,7 @@ def test_one_simulation_belongs_to_one_recording() -> None:
         check_same_flight(dives, dives[:1])
 
 
+@pytest.mark.long
 def test_the_command_says_that_a_true_simulation_lacks_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -66,6 +66,7 @@ def test_a_run_that_begins_while_another_judges_begins_after(monkeypatch: pytest
         assert not (np.isfinite(run.depth) & np.isfinite(unseen.depth)).any()
 
 
+@pytest.mark.long
 def test_a_long_recording_is_diagnosed_from_its_excerpt(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spans, "LONG", 1500)
     monkeypatch.setattr(spans, "EXCERPT", 800)

@@ -24,6 +24,7 @@ def _everything(time: float, x: Array, plane: float) -> tuple[float, float, floa
     return force, moment, 0.0
 
 
+@pytest.mark.long
 def test_six_effects_at_once_are_named_with_their_sizes() -> None:
     said: list[str] = []
     found = diagnose([hidden_dive(_everything, seed=4)], said.append)

@@ -224,6 +224,7 @@ def test_what_explains_most_alone_may_speak_against_the_base(monkeypatch: pytest
     assert by_single_effects([found[0]], lambda _: None, 1) == [found[0]]  # no other way: not asked
 
 
+@pytest.mark.long
 def test_what_is_found_may_speak_against_the_first_choice(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("host.diagnosis.diagnose.ways", lambda recordings: ways(recordings)[::-1])
     monkeypatch.setattr("host.diagnosis.diagnose.likelier_first", lambda found, *_: found)
