@@ -33,7 +33,7 @@ CATALOGUE: tuple[Effect, ...] = (
     *sensor.EFFECTS,
 )
 CHANGES = changes.EFFECTS
-"""Entries that are tried only where something is known to have changed."""
+"""Entries that are tried only after an alarm, or where a change shows."""
 BY_NAME = {effect.name: effect for effect in (*CHANGES, *CATALOGUE)}  # what changes a speed, before its loss
 UNKNOWN = {effect.name: effect for effect in unknown.FORMS}
 _TOOLS = (
@@ -60,6 +60,8 @@ FAINT = ("heave_pitch_acceleration_coupling", "plane_in_cross_flow", "speed_inde
 """What every vehicle has, too, but too weak to be found before all that is ordinary is there."""
 ALONG_THE_HULL = "drag_along_the_hull"
 """Of every long hull, but of no simulator that knows two drags only."""
+OVER_GROUND = "speed_over_ground"
+"""Of moving water, where the speed was measured against the bottom, or by a simulator."""
 
 
 def named(name: str) -> Effect:

@@ -19,6 +19,7 @@ Action = Callable[[Chain, ca.SX], None]
 class Change:
     """One quantity of the chain that takes another value at one moment.
 
+    details  what else the change has, and `likely` start values of these
     force, plane, sense  as of an Effect, with the change that has come so far
     """
 
@@ -27,6 +28,8 @@ class Change:
     size: Parameter
     sentence: str
     equation: str
+    details: tuple[Parameter, ...] = ()
+    likely: tuple[tuple[float, ...], ...] = ((),)
     force: Action | None = None
     plane: Action | None = None
     sense: Action | None = None
@@ -47,12 +50,12 @@ class Change:
         return Effect(
             name=self.name,
             slot=self.slot,
-            parameters=(self.size, moment),
+            parameters=(self.size, moment, *self.details),
             sentence=self.sentence,
             equation=f"{self.equation} (t > {time})",
             manoeuvre="the same manoeuvre before and after",
-            probes=((0.0, 0.5),),
-            scales=("", "duration"),
+            probes=tuple((0.0, 0.5, *values) for values in self.likely),
+            scales=("", "duration", *("" for _ in self.details)),
             force=with_size(self.force, come),
             plane=with_size(self.plane, come),
             sense=with_size(self.sense, come),
@@ -83,6 +86,7 @@ def _pitch_datum(c: Chain, size: ca.SX) -> None:
 
 
 def _current(c: Chain, size: ca.SX) -> None:
+    c.w = c.w - (1 - c.p.get("carried_share", 0.0)) * size
     c.climb += size
 
 
@@ -125,7 +129,17 @@ KINDS = (
         force=_current,
         size=Parameter(name="current_step", unit="m/s", lower=-3, upper=3, meaning="step of the current"),
         sentence="The vehicle entered or left water that moves up or down.",
-        equation="zeta' = ... + current_step",
+        equation="w - (1 - carried_share) current_step in place of w, zeta' = ... + current_step",
+        details=(
+            Parameter(
+                name="carried_share",
+                unit="1",
+                lower=0,
+                upper=1,
+                meaning="0 enters moving water as it moved before, 1 is carried along at once",
+            ),
+        ),
+        likely=((0.0,), (1.0,)),
     ),
 )
 EFFECTS = tuple(kind.effect() for kind in KINDS)

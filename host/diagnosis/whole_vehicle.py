@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import chi2
 
-from host.catalogue import ALONG_THE_HULL, BY_NAME, FAINT, ORDINARY
+from host.catalogue import ALONG_THE_HULL, BY_NAME, FAINT, ORDINARY, OVER_GROUND, named
 from host.catalogue.nuisance import SPEED_CORRECTION
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.margins import MUCH, margin
@@ -73,9 +73,12 @@ def with_all_ordinary(fitter: "Fitter", parent: Explanation) -> Explanation:
 def all_beside(fitter: "Fitter", leading: Explanation) -> Explanation:
     """The set with all that every vehicle has, and drag that acts along the hull, in one fit.
 
-    Begun where they hardly act yet; not carried to its end where much is left.
+    And where water moves, a measured speed that may not be through it. Begun where they hardly act yet; not
+    carried to its end where much is left.
     """
     fit, names = leading.fit, leading.names | {*ORDINARY, *FAINT, ALONG_THE_HULL}
+    if fitter.recordings[0].has_speed and names & {*named(OVER_GROUND).changes}:
+        names |= {OVER_GROUND}
     names |= {*fitter.tools_beside(names)}
     start = begun_beside(fitter, Point(fit.structure, fit.parameters, fit.initial, fit.levels), names)
     return ended(fitter, start, names)

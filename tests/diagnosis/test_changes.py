@@ -15,6 +15,7 @@ from host.diagnosis.exchange import exchanged
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.search import Search
 from host.diagnosis.spans import divide
+from host.diagnosis.whole_vehicle import all_beside
 from host.diagnosis.workers import Workers
 from host.errors import RecordingError
 from host.propagate import free_run, inputs_of
@@ -168,3 +169,37 @@ def test_a_change_of_no_size_leaves_the_speed_that_is_lost_as_it_is(change: str)
         parameters = np.array([known.get(name, 0.0) for name in structure.names])
         runs.append(free_run(parameters, np.array([0.0, 0.0, 0.0, 20.0]), inputs_of(dive, structure)).outputs)
     np.testing.assert_array_equal(*runs)
+
+
+@pytest.mark.parametrize(
+    ("share", "twin"),
+    [
+        (0.0, {"ballast_change": {"c_wb": -BASE["a1"] * 0.2, "ballast_time": 10.0}}),
+        (1.0, {"vertical_current": {"current": 0.2}}),
+    ],
+    ids=["a linear hull that enters it is moved as by a weight", "one that is carried along by a current"],
+)
+def test_water_that_moves_is_entered_or_carries_along(
+    share: float, twin: dict[str, dict[str, float]]
+) -> None:
+    dive = hidden_dive(duration=30.0)
+    dive = replace(dive, rudder=np.zeros(dive.time.size))  # a pitched hull has its weight not across it
+    when = 10.0 if share == 0.0 else -1.0
+    entered = {"current_step": 0.2, "current_change_time": when, "carried_share": share}
+    runs = []
+    for effects in ({"current_change": entered}, twin):
+        structure = structure_of(tuple(effects))
+        known = BASE | {name: value for values in effects.values() for name, value in values.items()}
+        parameters = np.array([known.get(name, 0.0) for name in structure.names])
+        runs.append(free_run(parameters, np.array([0.0, 0.0, 0.0, 20.0]), inputs_of(dive, structure)).outputs)
+    np.testing.assert_allclose(*runs, atol=1e-9)
+
+
+@pytest.mark.parametrize("has_speed", [True, False])
+def test_where_water_moves_a_measured_speed_may_not_be_through_it(has_speed: bool) -> None:
+    dive = hidden_dive(water, seed=4, duration=60.0)
+    speed = np.full(dive.time.size, BASE["u0"] if has_speed else np.nan)
+    fitter = Fitter([replace(dive, speed=speed)])
+    for name, is_there in (("current_change", has_speed), ("ballast_change", False)):
+        found = all_beside(fitter, fitter.grown(fitter.root, name, []))
+        assert ("speed_over_ground" in found.names) is is_there
