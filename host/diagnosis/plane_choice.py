@@ -60,7 +60,7 @@ def likelier_first(found: list[Way], on_progress: Callable[[str], None], jobs: i
     any; else all that every vehicle has, where next to nothing is left; else single effects.
     """
     leading, *others = sorted(found, key=lambda way: way.fitter.root.bic)
-    whole = at_the_outset(leading.fitter)
+    whole = at_the_outset(leading.fitter, jobs)
     if whole is not None and whole.leaves_white:
         return _by_whole([leading, *others], whole)
     seen = _among_waves(found)
@@ -99,8 +99,11 @@ def by_single_effects(found: list[Way], on_progress: Callable[[str], None], jobs
     best = sorted(leading.alone, key=lambda e: e.bic)[:LEADING]
     least = min(leading.fitter.root.bic, best[0].bic, leading.fitter.linear.bic) - NAMING_MARGIN
     alone = (other.fitter.reduced(e, e.names).bic for e in best)
-    there = (other.fitter.root.bic, *alone, other.fitter.linear.bic)
-    return [other, leading] if min(there) < least else [leading, other]
+    if min(other.fitter.root.bic, *alone, other.fitter.linear.bic) >= least:
+        return [leading, other]
+    with Workers(other.fitter, jobs) as workers:
+        there = workers.results([(Fitter.reduced, (e, e.names)) for e in leading.alone])
+    return [other._replace(alone=tuple(there)), leading]
 
 
 def is_likelier(

@@ -15,12 +15,12 @@ from scipy.stats import chi2
 from host.catalogue import ALONG_THE_HULL, BY_NAME, FAINT, ORDINARY, OVER_GROUND, named
 from host.catalogue.nuisance import SPEED_CORRECTION
 from host.diagnosis.explanation import Explanation, Names
-from host.diagnosis.margins import MUCH, margin
+from host.diagnosis.margins import LITTLE, MUCH, margin
 from host.diagnosis.pruning import pruned
-from host.diagnosis.starts import begun_beside
+from host.diagnosis.starts import begun_beside, with_other_moments
 from host.gauss_newton import Point
 from host.uncertainty import covariance_within
-from host.valleys import are_apart, look_alikes
+from host.valleys import are_apart, has_usual_heave, look_alikes, with_usual_heave
 from host.whiteness import correlation_factor
 
 if TYPE_CHECKING:
@@ -81,12 +81,22 @@ def all_beside(fitter: "Fitter", leading: Explanation) -> Explanation:
         names |= {OVER_GROUND}
     names |= {*fitter.tools_beside(names)}
     start = begun_beside(fitter, Point(fit.structure, fit.parameters, fit.initial, fit.levels), names)
-    return ended(fitter, start, names)
+    found = ended(fitter, start, names)
+    if fitter.excess(found.fit) < LITTLE:
+        return found
+    # Bent to do without the rest, it may have put a change at another moment.
+    moved = [ended(fitter, at, names) for at in with_other_moments(fitter, found)]
+    return min([found, *moved], key=lambda e: e.bic)
 
 
 def ended(fitter: "Fitter", start: Point, names: Names) -> Explanation:
-    """A set of many from this start, polished where it leaves little."""
-    found = fitter.explained(names, fitter.fitted([start], first=PATIENT))
+    """A set of many from this start, polished where it leaves little.
+
+    And from the heave of a usual hull, where the start has none: a set that lacks an effect may follow its
+    plane at once, and from there many lead nowhere.
+    """
+    starts = [start] if has_usual_heave(start) else [start, *with_usual_heave(start)]
+    found = fitter.explained(names, fitter.fitted(starts, first=PATIENT))
     return fitter.polished(found) if fitter.excess(found.fit) < MUCH else found
 
 

@@ -15,7 +15,7 @@ from host.diagnosis.diagnose import diagnose
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import LITTLE, MUCH
-from host.diagnosis.outset import FAR_LESS, at_the_outset
+from host.diagnosis.outset import FAR_LESS, LOST, at_the_outset
 from host.diagnosis.plane_choice import Way, likelier_first
 from host.diagnosis.search import Search
 from host.read_recordings import read_recordings
@@ -35,6 +35,10 @@ def real() -> Fitter:
 
 def ballast(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
     return (0.15 if time > 30.0 else 0.0), 0.0, 0.0
+
+
+def swell(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+    return 0.0, 0.0, 0.3 * np.sin(2.0 * np.pi * time / 20.0)
 
 
 def test_of_a_real_vehicle_all_that_every_one_has_leaves_nothing(real: Fitter) -> None:
@@ -65,9 +69,20 @@ def test_a_textbook_vehicle_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> Non
     assert at_the_outset(fitter) is None
 
 
-def test_what_no_vehicle_has_by_itself_is_searched_for_alone() -> None:
+def test_where_it_leads_nowhere_something_may_have_changed(monkeypatch: pytest.MonkeyPatch) -> None:
     fitter = Fitter([hidden_dive(ballast, duration=60.0)])
-    assert fitter.excess(fitter.root.fit) > MUCH
+    assert fitter.excess(fitter.root.fit) > LOST
+    found = at_the_outset(fitter)
+    assert found is not None
+    assert "ballast_change" in found.names
+    assert found.leaves_white
+    monkeypatch.setattr(outset, "_beside_a_change", lambda fitter, _: fitter.root)
+    assert at_the_outset(fitter) is None
+
+
+def test_water_that_swings_is_no_change_at_a_moment() -> None:
+    fitter = Fitter([hidden_dive(swell, duration=60.0)])
+    assert fitter.excess(fitter.root.fit) > LOST
     assert at_the_outset(fitter) is None
 
 
@@ -113,7 +128,7 @@ def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> N
 
     whole: Any = SimpleNamespace(bic=-10.0, names=MANY, leaves_white=True)
     held, moved, worse = way(-2.0, np.nan), way(-1.0, -11.0), way(-1.0, -9.0)
-    monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: whole)
+    monkeypatch.setattr(plane_choice, "at_the_outset", lambda *_: whole)
     monkeypatch.setattr(plane_choice, "plain_waves", None)  # nothing is left to see
     assert order(moved, held) == [0, 1]
     assert order(worse, held) == [1, 0]
@@ -125,7 +140,7 @@ def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)
     assert order(moved, held) == [0, 1]
     assert likelier_first([held], lambda _: None, 1)[0].outset is whole
-    monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: None)
+    monkeypatch.setattr(plane_choice, "at_the_outset", lambda *_: None)
     monkeypatch.setattr(plane_choice, "by_single_effects", lambda found, *_: found[::-1])
     assert order(moved, held) == [1, 0]
 
