@@ -1,6 +1,6 @@
 """What changes at one moment, beside ballast and the plane's effect: tried where something is known to have.
 
-By an alarm, or as one of these two is likeliest so far. A recording that shows no such moment would mostly
+By an alarm, or as one of all these is likeliest so far. A recording that shows no such moment would mostly
 let them imitate what acts all the time.
 """
 

@@ -60,6 +60,7 @@ def likelier_first(found: list[Way], on_progress: Callable[[str], None], jobs: i
     any; else all that every vehicle has, where next to nothing is left; else single effects.
     """
     leading, *others = sorted(found, key=lambda way: way.fitter.root.bic)
+    on_progress("what every vehicle has")
     whole = at_the_outset(leading.fitter, jobs)
     if whole is not None and whole.leaves_white:
         return _by_whole([leading, *others], whole)

@@ -106,6 +106,7 @@ def search_of(workers: Workers, fitter: Fitter) -> Search:
     return Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
 
 
+@pytest.mark.long
 def test_what_a_free_run_cannot_find_is_found_while_the_measurements_steer() -> None:
     fitter = Fitter([dive(SHORT, rows=1400, is_weakened=True)])
     assert fitter.excess(fitter.root.fit) > 100.0  # a linear hull has nothing to do with it
@@ -185,6 +186,7 @@ def test_a_damping_that_began_at_next_to_nothing_grows(monkeypatch: pytest.Monke
     assert module._climbed(fitter, start, 10).fit.parameters[a2] > -0.1
 
 
+@pytest.mark.long
 def test_a_current_joins_beside_the_free_trim_that_cannot_do_its_work() -> None:
     fitter = Fitter([dive(LONG, current=0.1)])
     with Workers(fitter, 1) as workers:

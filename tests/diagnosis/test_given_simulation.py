@@ -107,6 +107,7 @@ def test_the_same_hull_at_another_speed_is_the_same() -> None:
     assert slower["u0"][0] == 1.2
 
 
+@pytest.mark.long
 def test_a_weaker_effect_in_the_simulation_is_no_missing_one(coupled: Diagnosis) -> None:
     weak = hidden_dive(lambda _, x, __: (0.3 * x[1], 0.0, 0.0), seed=1, noise=0.0)
     answer = against_simulation(coupled, [weak])
