@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from host.catalogue import BY_NAME
+from host.catalogue.kin import both_come
 from host.diagnosis.diagnose import Diagnosis
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
@@ -82,11 +83,13 @@ def separations(found: Diagnosis, on_progress: Progress = lambda _: None) -> lis
 
 def _separation(found: Diagnosis, name: str, twin: str, rival: Explanation) -> Separation:
     named = found.extended
+    # What came at one moment was there before and after in either case.
+    advice = _else(name, twin) if both_come(BY_NAME[name], BY_NAME[twin]) else BY_NAME[name].manoeuvre
     base = Separation(
         effect=name,
         twin=twin,
         manoeuvre=None,
-        sentence=f"to tell {_title(name)} from {_title(twin)}: {BY_NAME[name].manoeuvre}",
+        sentence=f"to tell {_title(name)} from {_title(twin)}: {advice}",
         predicted=float("nan"),
         confirmed=float("nan"),
         difference=np.empty((2, 0)),
@@ -163,9 +166,14 @@ def _none(found: Diagnosis, flights: list["_Flight"], name: str, twin: str) -> s
                 f"{begin}; with the speed recorded, {best.manoeuvre.words} would, within "
                 f"{best.manoeuvre.duration:.0f} s (predicted chi2 {best.with_speed:.0f})"
             )
+    return f"{begin}; what would: {_else(name, twin)}"
+
+
+def _else(name: str, twin: str) -> str:
+    """What other measurement would tell."""
     slots = [BY_NAME[one].slot for one in (name, twin)]
     strange: list[Slot] = ["environment", "sensor", "actuator", "surge", "kinematics", "heave", "pitch"]
-    return f"{begin}; what would: {ELSE[min(slots, key=strange.index)]}"
+    return ELSE[min(slots, key=strange.index)]
 
 
 class _Flight:

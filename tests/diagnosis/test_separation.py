@@ -9,7 +9,7 @@ from hidden_dive import hidden_dive
 from host.diagnosis.diagnose import Diagnosis
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.manoeuvres import LONGEST, SHORTEST, library
-from host.diagnosis.separation import SEPARATES, _Flight, separations
+from host.diagnosis.separation import SEPARATES, _else, _Flight, separations
 
 
 def with_twin(found: Diagnosis, twin: str) -> Diagnosis:
@@ -98,6 +98,14 @@ def test_an_event_of_the_recording_cannot_be_flown_again(coupled: Diagnosis) -> 
     assert found.manoeuvre is None
     assert np.isnan(found.predicted)
     assert found.sentence
+
+
+def test_what_came_at_one_moment_is_told_by_another_measurement() -> None:
+    for name, twin, told in (
+        ("ballast_change", "current_change", "another speed"),
+        ("rudder_offset_change", "trim_moment_change", "a sensor of the plane's own angle"),
+    ):
+        assert told in _else(name, twin)
 
 
 def test_a_dive_near_the_surface_is_flown_where_there_is_water(coupled: Diagnosis) -> None:
