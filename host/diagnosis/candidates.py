@@ -29,9 +29,9 @@ def other_changes(search: "Search") -> list[str]:
 
 
 def _shows_a_change(search: "Search") -> bool:
-    """Whether a lost ballast or a plane that turns the vehicle less is in the likeliest set so far.
+    """Whether a change at one moment is in the likeliest set so far.
 
-    It may stand for another change that came then.
+    At first a lost ballast, or a plane that turns the vehicle less; it may stand for another that came then.
     """
     likeliest = min(search.tried.values(), key=lambda e: e.bic, default=search.root)
     return bool(likeliest.names & SCANS.keys())
