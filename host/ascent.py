@@ -21,6 +21,7 @@ LONGEST_STRIDE = 2.5  # of the same in one step
 SETTLED = 0.02  # of the log-likelihood: a step that gains less is the last
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e6
 FALSE_PROMISE = 10.0  # of the log-likelihood, by a step that gained nothing: its slopes are not the true ones
+QUICKER = 3.0  # times the pace of its last step, that a search may still gain
 STRIDE = 1e-3  # of a deviation, by which a parameter or an initial state is moved for derivatives
 
 
@@ -83,11 +84,13 @@ def ascend(
     most_steps: int,
     holds_noise: bool = False,
     holds_gain: bool = False,
+    least: float = -np.inf,
 ) -> tuple[Place[P], int, bool]:
     """Climbs from a point; gives where it ended, after how many steps, and whether it had converged.
 
     holds_noise  whether the noise levels stay as they are, which saves most of the work
     holds_gain   whether no step asks how the gain moves with the parameters
+    least        a log-likelihood: it gives up where three times the pace of its last step would not get there
     """
     here, damping, converged, used = place(point, model), FIRST_DAMPING, False, 0
     while not converged and used < most_steps and np.isfinite(here.likelihood):
@@ -103,6 +106,8 @@ def ascend(
         if gained > 0.0:
             here = there
         damping /= 20.0
+        if here.likelihood + QUICKER * gained * (most_steps - used) < least:
+            break
     return here, used, converged
 
 

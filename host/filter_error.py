@@ -5,7 +5,7 @@ Source: Maine and Iliff, NASA RP-1138; Klein and Morelli, Aircraft System Identi
 
 import numpy as np
 
-from host.ascent import ascend
+from host.ascent import ascend, place
 from host.fit import Fit, finished, run_away
 from host.gauss_newton import Mask, Point, whiten
 from host.kalman import KalmanPass, kalman_pass
@@ -54,14 +54,23 @@ def filter_error_from(
     most_steps: int = 40,
     holds_noise: bool = False,
     holds_gain: bool = False,
+    least: float = -np.inf,
 ) -> Fit:
-    """The same from any point with forces; or the parameters alone, under these very forces."""
+    """The same from any point with forces; or the parameters alone, under these very forces.
+
+    least  a log-likelihood: given up where it would not get there
+    """
     model = RandomForces(inputs)
-    end, used, converged = ascend(point, model, free, most_steps, holds_noise, holds_gain)
+    end, used, converged = ascend(point, model, free, most_steps, holds_noise, holds_gain, least)
     if not np.isfinite(end.likelihood):
         return run_away(point, inputs, free)
     white = model.whitened(end.point, end.passes)
     return finished(end.point, white, inputs, free, end.likelihood, used, converged)
+
+
+def likelihood_under_forces(point: Point, inputs: list[Inputs]) -> float:
+    """The log-likelihood at a point with forces; -inf where it leaves the numbers."""
+    return place(point, RandomForces(inputs)).likelihood
 
 
 def whitened_innovations(

@@ -130,16 +130,25 @@ def in_waves(start: Fit, inputs: list[Inputs], most_steps: int = MOST_STEPS) -> 
 
 
 def in_waves_from(
-    point: Point, inputs: list[Inputs], free: Mask, most_steps: int = MOST_STEPS, holds_noise: bool = False
+    point: Point,
+    inputs: list[Inputs],
+    free: Mask,
+    most_steps: int = MOST_STEPS,
+    holds_noise: bool = False,
+    least: float = -np.inf,
 ) -> Fit:
     """The same from any point with waves in its noise (7,); or the parameters alone, in these very waves.
+
+    least  a log-likelihood: given up where it would not get there
 
     A full climb goes from another heave damping, too: waves hide which valley is the vehicle's.
     """
     model, wider = _among(point, inputs)
     wider_free = np.concatenate([free, np.zeros(len(SHAPE), dtype=bool)])
     # Waves excuse much: how the gain moves with the parameters counts for little while sets are compared.
-    best, used, converged = ascend(wider, model, wider_free, most_steps, holds_noise, holds_gain=holds_noise)
+    best, used, converged = ascend(
+        wider, model, wider_free, most_steps, holds_noise, holds_gain=holds_noise, least=least
+    )
     if most_steps > FIRST_STEPS and not holds_noise:
         starts = with_usual_heave(best.point)
         ends = [
@@ -240,9 +249,10 @@ def _first(start: Fit, inputs: list[Inputs]) -> Point:
         for driving in (as_forces, *(swings**2 * as_noise for swings in SWINGS)):
             levels = np.array([*start.noise[:2], s, d, 0.0, *driving])
             points.append(Point(start.structure, start.parameters, start.initial, levels))
-    return max(points, key=lambda point: _likelihood(point, inputs))
+    return max(points, key=lambda point: likelihood_in_waves(point, inputs))
 
 
-def _likelihood(point: Point, inputs: list[Inputs]) -> float:
+def likelihood_in_waves(point: Point, inputs: list[Inputs]) -> float:
+    """The log-likelihood at a point with waves in its noise (7,); -inf where it leaves the numbers."""
     model, wider = _among(point, inputs)
     return place(wider, model).likelihood

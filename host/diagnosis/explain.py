@@ -22,8 +22,10 @@ from host.diagnosis.seas import (
     among_waves,
     explains_more,
     in_a_sea,
+    in_a_swell,
     in_plain_waves,
     led_astray,
+    pushed_about,
 )
 from host.diagnosis.unknown_physics import unknown_in, with_unknown
 from host.diagnosis.workers import Workers
@@ -51,6 +53,8 @@ def explain(
     search = Search(fitter, workers, on_progress, fitter.base, fitter.root, known, way.alone)
     waves = way.waves if part is None else None
     search.asks_drift, search.is_second = waves is None, is_second
+    if part is None and (whole := _begun_with_all(search, way)) is not None:
+        return whole
     plain = None if waves is None else _PlainWaves(search, waves)
     if plain is not None:
         search.instead = plain.leave_nothing
@@ -100,6 +104,13 @@ def explain(
     if told is None and (lean := leanest(search, best)) is not best:
         best, left = lean, leftover(fitter, lean)
     return Explained(best, search, left, told)
+
+
+def _begun_with_all(search: Search, way: Way) -> Explained | None:
+    """What is found from all that every vehicle has among waves or random forces, where these were told."""
+    if way.swell is not None:
+        return in_a_swell(search, way.swell)
+    return None if way.pushed is None else pushed_about(search, way.pushed)
 
 
 class _PlainWaves:

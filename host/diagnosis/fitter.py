@@ -16,9 +16,9 @@ from host.diagnosis.first_guess import accelerations
 from host.diagnosis.spans import ALARM_LATE
 from host.diagnosis.starts import guess, idle, is_far, scanned, starts_again, starts_of
 from host.diagnosis.trims import HELD, trimmed
+from host.diagnosis.under_forces import climbed, likelihood
 from host.drift import drifts_of, whitenings
 from host.equations import NAMES, Effect
-from host.filter_error import filter_error_from
 from host.fit import NO_WANDER, Fit
 from host.gauss_newton import Mask, Point
 from host.maximum_likelihood import fit_maximum_likelihood
@@ -33,7 +33,6 @@ from host.valleys import (
     plausibility,
     with_rivals,
 )
-from host.waves import in_waves_from
 
 ALARM_EARLY = 30.0  # s, by which a moment that somebody names may lie before the change
 # Enough to rank sets; those that count are polished.
@@ -147,7 +146,7 @@ class Fitter:
         starts = starts_of(self, parent, name, values, rival)
         if parent.fit.has_process_noise:  # no free run tells which start is good
             few = starts[:1] if rival is None else [starts[0], starts[-1]]
-            return self.explained(parent.names | {name}, self.fitted(few))
+            return self.explained(parent.names | {name}, self.fitted(few, goal))
         fit = self.fitted(starts, goal)
         again = starts_again(self, parent, name, values, self.explained(parent.names | {name}, fit))
         others = [self.fitted([start], goal or fit, PATIENT_ITERATIONS) for start in again]
@@ -161,10 +160,10 @@ class Fitter:
         names = parent.names - {*members}
         start = self.point(names, parent)
         ahead = one_step_without(parent.fit, *map(named, members))
-        if ahead is not None and not parent.fit.has_process_noise:
+        if ahead is not None:
             known = dict(zip(parent.fit.structure.names, ahead[1].tolist(), strict=True))
             moved = replace(start, parameters=np.array([known[own] for own in start.structure.names]))
-            start = min(start, moved, key=lambda point: free_run_cost(point, self.inputs(names)))
+            start = max(moved, start, key=self._likelihood)
         starts = [start]
         if not parent.fit.has_process_noise and is_far(self, parent):
             starts.append(guess(self, start, names))
@@ -294,10 +293,10 @@ class Fitter:
         structure = starts[0].structure
         names = frozenset(effect.name for effect in structure.effects)
         inputs, free = self.inputs(names), self.free(names)
-        if starts[0].noise[2:].any():
-            ends = [self._under_forces(start, holds_noise=True) for start in starts]
-            return max(ends, key=lambda fit: fit.log_likelihood)
         least = -np.inf if rival is None else rival.log_likelihood
+        if starts[0].noise[2:].any():
+            ends = [climbed(self, start, True, least - MADE_UP_FOR) for start in starts]
+            return max(ends, key=lambda fit: fit.log_likelihood)
         hopeless = least - (0.0 if rival is None else HOPELESS * rival.samples)
         fits = [output_error(start, inputs, free, first, TOLERANCE, hopeless) for start in starts]
         best = max(fits, key=lambda fit: fit.log_likelihood)
@@ -306,10 +305,17 @@ class Fitter:
         on = Point(structure, best.parameters, best.initial, best.noise)
         return output_error(on, inputs, free, MOST_ITERATIONS, TOLERANCE, least - MADE_UP_FOR)
 
+    def _likelihood(self, point: Point) -> float:
+        """The log-likelihood at a point, but for a constant, by a filter where the point has forces."""
+        if point.noise[2:].any():
+            return likelihood(self, point)
+        names = frozenset(effect.name for effect in point.structure.effects)
+        return -free_run_cost(point, self.inputs(names))
+
     def carried_on(self, start: Point, tolerance: float = SETTLED) -> Fit:
         """A fit from this point to its end, under random forces or waves where the point has them."""
         if start.noise[2:].any():
-            return self._under_forces(start, holds_noise=False)
+            return climbed(self, start, holds_noise=False)
         names = frozenset(effect.name for effect in start.structure.effects)
         return output_error(start, self.inputs(names), self.free(names), tolerance=tolerance)
 
@@ -319,18 +325,6 @@ class Fitter:
         Larger ones excuse so much that how the filter's gain moves with the parameters hardly counts.
         """
         return bool((noise[2:4] < SLIGHT * np.square(self.accelerations)).all())
-
-    def _under_forces(self, start: Point, holds_noise: bool) -> Fit:
-        """While sets are compared, forces stay as they were first found, and waves to the end.
-
-        Their levels take most of the time, and a set that is better than another is so at any of them.
-        """
-        names = frozenset(effect.name for effect in start.structure.effects)
-        inputs, free = self.inputs(names, for_filter=True), self.free(names)
-        if start.noise.size > 4:
-            return in_waves_from(start, inputs, free, holds_noise=True)
-        holds_gain = not self.are_slight(start.noise)
-        return filter_error_from(start, inputs, free, holds_noise=holds_noise, holds_gain=holds_gain)
 
 
 def first_known(values: Array) -> float:

@@ -7,15 +7,20 @@ What they hardly touch is no hull's: then something may have changed under way.
 """
 
 from collections.abc import Iterator
+from math import log
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from host.catalogue import ALONG_THE_HULL, FAINT, ORDINARY
 from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.margins import LITTLE, MUCH
+from host.diagnosis.margins import LITTLE, MUCH, margin
 from host.diagnosis.pruning import pruned
+from host.diagnosis.sea_fits import as_filtered, with_sea
+from host.diagnosis.speed_forces import are_by_speed
 from host.diagnosis.starts import begun_beside, guess
 from host.diagnosis.together import with_more
 from host.diagnosis.whole_vehicle import all_beside, ended, is_real
@@ -27,29 +32,41 @@ if TYPE_CHECKING:
 
 FAR_LESS = 0.1  # of what the root leaves
 LOST = 20.0  # times the noise floor: no hull leaves so much by what it is, but by what happens to it
+MOST_FORCES = 0.1  # of the variance of all force: what acts is known but for a tenth
+FAR_LIKELIER = 0.1  # of BIC a sample, under random forces
+FAIR_PART = 0.02  # of what these explain, that what is missing should gain even beside them
 LEADING = 3  # changes, beside which all the rest is tried
 
 
 def at_the_outset(fitter: Fitter, jobs: int = 1) -> Explanation | None:
-    """The root with all that every vehicle has, where it leaves much and they white noise, or far less.
+    """The root with all that every vehicle has, where that leaves much; None where it does not.
 
-    Where they lead nowhere, beside a change at one moment, if that leaves little. None where none do.
+    Where they lead nowhere, beside a change at one moment, if that leaves less.
     """
-    left = fitter.excess(fitter.root.fit)
-    if left < MUCH:
+    if fitter.excess(fitter.root.fit) < MUCH:
         return None
     best = fitter.root
     names = frozenset({FREE_TRIM.name, *ORDINARY, *FAINT, ALONG_THE_HULL})
     names |= {*fitter.tools_beside(names)}
     for start in _starts(fitter, names):
         found = ended(fitter, start, names)
-        if fitter.excess(found.fit) < MUCH and found.leaves_white:
+        if says_all(fitter, found):
             return found
         best = min(best, found, key=lambda e: e.bic)
-        if fitter.excess(found.fit) > LOST:
-            best = min(best, _beside_a_change(fitter, jobs), key=lambda e: e.bic)
-            return best if fitter.excess(best.fit) < MUCH else None
-    return fitter.polished(best) if fitter.excess(best.fit) < FAR_LESS * left else None
+        if fitter.excess(best.fit) > LOST:
+            return min(best, _beside_a_change(fitter, jobs), key=lambda e: e.bic)
+    return best
+
+
+def says_all(fitter: Fitter, whole: Explanation) -> bool:
+    """Whether it leaves white noise, as sensors have it."""
+    return whole.leaves_white and fitter.excess(whole.fit) < MUCH
+
+
+def leads_on(fitter: Fitter, whole: Explanation) -> bool:
+    """Whether all that every vehicle has leaves far less than the root, or beside a change not much."""
+    most = MUCH if whole.names & {*SCANS} else FAR_LESS * fitter.excess(fitter.root.fit)
+    return fitter.excess(whole.fit) < most
 
 
 def _beside_a_change(fitter: Fitter, jobs: int) -> Explanation:
@@ -59,6 +76,24 @@ def _beside_a_change(fitter: Fitter, jobs: int) -> Explanation:
         leading = sorted(alone, key=lambda e: e.bic)[:LEADING]
         found: list[Explanation] = workers.results([(all_beside, (one,)) for one in leading])
     return min(found, key=lambda e: e.bic)
+
+
+def pushed_by_forces(search: "Search", whole: Explanation) -> Explanation | None:
+    """The same under random forces, where these explain the rest and nothing gains beside them; else None.
+
+    Then the vehicle is as the equations have it but for what pushes it about and is in no catalogue, as turns
+    do; of something in the catalogue those forces would be the worse half.
+    """
+    fitter = search.fitter
+    if not LITTLE < fitter.excess(whole.fit) < LOST:
+        return None
+    sea = with_sea(fitter, whole)
+    explained = as_filtered(fitter, whole).bic - sea.bic
+    are_many = (sea.fit.noise[2:] > MOST_FORCES * np.square(fitter.accelerations)).any()
+    if are_many or explained < FAR_LIKELIER * sea.fit.samples or are_by_speed(fitter, sea.fit):
+        return None
+    least = max(margin(sea) + log(sea.fit.samples), FAIR_PART * explained)
+    return sea if max(search.gains(sea).values()) < least else None
 
 
 def goes_on_from(search: "Search", joint: Explanation) -> bool:

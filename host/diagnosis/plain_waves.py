@@ -4,6 +4,8 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import LINEAR, Fitter
 from host.diagnosis.margins import LITTLE, NAMING_MARGIN
 from host.diagnosis.sea_fits import as_filtered, roughly_with_waves, with_sea, with_waves
+from host.diagnosis.starts import begun_beside
+from host.gauss_newton import Point
 from host.waves import MOST_STEPS, is_sea
 
 MOSTLY = 0.7  # of what waves explain: of true ones a linear hull explains at most 0.4, of false ones 0.9
@@ -32,6 +34,25 @@ def plain_waves(fitter: Fitter) -> Explanation | None:
         return None
     beside = _beside_hull(fitter, _linear_in(fitter, sea), gain)
     return None if beside is None else with_waves(fitter, sea, beside.fit)
+
+
+def whole_in_waves(fitter: Fitter, waves: Explanation, whole: Explanation) -> Explanation | None:
+    """All that every vehicle has among waves that are likeliest beside it; None if something is left.
+
+    Waves that are estimated beside the root alone are too broad: they do the work of what it lacks, and so
+    hide what is slight.
+
+    waves  the root among waves, where all of it must pay
+    whole  the same without waves, which must be far less likely
+    """
+    fit, names = waves.fit, whole.names
+    start = begun_beside(fitter, Point(fit.structure, fit.parameters, fit.initial, fit.levels), names)
+    held = fitter.explained(names, fitter.carried_on(start))
+    if held.bic > waves.bic - NAMING_MARGIN:
+        return None
+    found = with_waves(fitter, held)
+    is_likelier = found.bic < as_filtered(fitter, whole).bic - NAMING_MARGIN
+    return found if is_likelier and is_sea(found.fit) and found.leaves_white else None
 
 
 def _follow_the_plane(fitter: Fitter, sea: Explanation, waves: Explanation) -> bool:

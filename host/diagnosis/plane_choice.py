@@ -9,9 +9,9 @@ import numpy as np
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.margins import NAMING_MARGIN, margin
-from host.diagnosis.outset import at_the_outset
-from host.diagnosis.plain_waves import plain_waves
+from host.diagnosis.margins import LARGEST_SET, NAMING_MARGIN, margin
+from host.diagnosis.outset import at_the_outset, leads_on, pushed_by_forces, says_all
+from host.diagnosis.plain_waves import plain_waves, whole_in_waves
 from host.diagnosis.sea_fits import with_waves
 from host.diagnosis.search import Search
 from host.diagnosis.spans import divide, excerpt
@@ -29,6 +29,8 @@ class Way(NamedTuple):
 
     waves  the root among waves, where these are plain to see
     outset  the root with all that every vehicle has, where that leaves nothing, or next to nothing
+    swell  the same among waves that are estimated beside it, where that leaves nothing
+    pushed  the same under random forces, where nothing in the catalogue gains beside these
     alone  each effect alone, where these were fitted
     """
 
@@ -36,6 +38,8 @@ class Way(NamedTuple):
     fitter: Fitter
     waves: Explanation | None = None
     outset: Explanation | None = None
+    swell: Explanation | None = None
+    pushed: Explanation | None = None
     alone: tuple[Explanation, ...] = ()
 
 
@@ -57,17 +61,21 @@ def likelier_first(found: list[Way], on_progress: Callable[[str], None], jobs: i
     """The ways, the likelier first, as what tells more than the base equations do sees them.
 
     That is all that every vehicle has, where nothing is left beside it; else plain waves, where there are
-    any; else all that every vehicle has, where next to nothing is left; else single effects.
+    any, with all that where it is likelier; else all that every vehicle has, where next to nothing is left,
+    or random forces account for that; else single effects.
     """
     leading, *others = sorted(found, key=lambda way: way.fitter.root.bic)
     on_progress("what every vehicle has")
     whole = at_the_outset(leading.fitter, jobs)
-    if whole is not None and whole.leaves_white:
+    if whole is not None and says_all(leading.fitter, whole):
         return _by_whole([leading, *others], whole)
-    seen = _among_waves(found)
-    if seen or whole is None:
-        return seen or by_single_effects(found, on_progress, jobs)
-    return _by_whole([leading, *others], whole)
+    if seen := _among_waves(found):
+        on_progress("what every vehicle has, in the waves")
+        return _in_a_swell(seen, whole)
+    if whole is not None and leads_on(leading.fitter, whole):
+        return _by_whole([leading, *others], leading.fitter.polished(whole))
+    pushed = None if whole is None else _pushed_about([leading, *others], whole, on_progress, jobs)
+    return pushed or by_single_effects(found, on_progress, jobs)
 
 
 def _by_whole(found: list[Way], whole: Explanation) -> list[Way]:
@@ -84,6 +92,34 @@ def _among_waves(found: list[Way]) -> list[Way]:
         return []
     seen = [leading._replace(waves=waves), *(way._replace(waves=plain_waves(way.fitter)) for way in rest)]
     return sorted(seen, key=lambda way: inf if way.waves is None else way.waves.bic)
+
+
+def _in_a_swell(seen: list[Way], whole: Explanation | None) -> list[Way]:
+    """The ways among waves as all that every vehicle has beside these sees them, where it says more."""
+    leading, *others = seen
+    if whole is None or leading.waves is None:
+        return seen
+    swell = whole_in_waves(leading.fitter, leading.waves, whole)
+    if swell is None:
+        return seen
+    begun = [leading._replace(swell=swell)]
+    begun += [way._replace(swell=way.fitter.reduced(swell, swell.names)) for way in others]
+    return sorted(begun, key=lambda way: inf if way.swell is None else way.swell.bic)
+
+
+def _pushed_about(
+    found: list[Way], whole: Explanation, on_progress: Callable[[str], None], jobs: int
+) -> list[Way]:
+    """The ways as all that every vehicle has under random forces sees them, where these explain the rest."""
+    leading, *others = found
+    with Workers(leading.fitter, jobs) as workers:
+        fitter = leading.fitter
+        pushed = pushed_by_forces(Search(fitter, workers, on_progress, fitter.base, fitter.root), whole)
+    if pushed is None:
+        return []
+    begun = [leading._replace(pushed=pushed)]
+    begun += [way._replace(pushed=way.fitter.reduced(pushed, pushed.names)) for way in others]
+    return sorted(begun, key=lambda way: inf if way.pushed is None else way.pushed.bic)
 
 
 def by_single_effects(found: list[Way], on_progress: Callable[[str], None], jobs: int) -> list[Way]:
@@ -121,7 +157,8 @@ def is_likelier(
     """
     fitter = Fitter(other.fitter.recordings, known=best)
     if in_own_waves is not None:
-        sets = [in_own_waves, *(fitter.reduced(in_own_waves, names) for names in _leaner(in_own_waves))]
+        fewer = _leaner(in_own_waves) if len(in_own_waves.names) <= LARGEST_SET else []
+        sets = [in_own_waves, *(fitter.reduced(in_own_waves, names) for names in fewer)]
         return min(with_waves(fitter, one).bic for one in sets) < in_own_waves.bic - margin(in_own_waves)
     bare = [(e.names - {FREE_TRIM.name}, e) for e in sorted(search.tried.values(), key=lambda e: e.bic)]
     close = {best.names: best} | {names: e for names, e in bare[::-1] if names in _leaner(best)}

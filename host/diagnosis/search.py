@@ -94,12 +94,15 @@ class Search:
             return min((e for e in self.tried.values() if FREE_TRIM.name not in e.names), key=lambda e: e.bic)
         return with_best_offsets(self) if self.is_needless else self._concluded()
 
-    def run_from(self, joint: Explanation) -> Explanation:
-        """The best explanation from a set of many: with what else promises most, pruned and exchanged."""
+    def run_from(self, joint: Explanation, is_all: bool = False) -> Explanation:
+        """The best explanation from a set of many: with what else promises most, pruned and exchanged.
+
+        is_all  nothing else promises anything, as was asked before
+        """
         for explanation in (self.base, self.root, joint):
             self.remember(explanation)
         self.joint.add(joint.names)
-        self.remember(pruned(self, with_more(self, joint, least=0.0)))
+        self.remember(pruned(self, joint if is_all else with_more(self, joint, least=0.0)))
         return self._concluded()
 
     def settle(self, best: Explanation) -> Explanation:

@@ -26,9 +26,11 @@ from host.diagnosis.sea_fits import (
 from host.diagnosis.search import Search
 from host.diagnosis.speed_forces import are_by_speed
 from host.diagnosis.trims import retrimmed
+from host.diagnosis.whole_vehicle import is_real
 from host.diagnosis.workers import Workers
 from host.waves import is_sea, mean_moment
 
+DOUBTED = 100.0  # of BIC in the waves of a search, of which others may do a part
 MEAN_MOMENTS = 2.0  # of what it may be: four seas came to 1.0 to 1.3
 
 
@@ -149,6 +151,36 @@ def in_plain_waves(calm: Search, waves: Explanation) -> Explained:
     return Explained(found, search, leftover(calm.fitter, told.fitted), told)
 
 
+def in_a_swell(calm: Search, swell: Explanation) -> Explained | None:
+    """The search from all that every vehicle has among waves estimated beside it; None if few of it pay.
+
+    Or if something is left: as no search without waves was made, nothing speaks for them then.
+    """
+    fitter = calm.fitter
+    search = _among(calm, swell)
+    found = search.run_from(swell)
+    if not is_real(found.names):
+        return None
+    found, fitted = _beside_own_waves(search, swell, found)
+    left = leftover(fitter, fitted)
+    told = _told(fitter, fitted, with_sea(fitter, fitted).bic - fitted.bic)
+    return Explained(found, search, left, told) if left.is_nothing else None
+
+
+def pushed_about(calm: Search, pushed: Explanation) -> Explained | None:
+    """What pays of all that every vehicle has under random forces; None if little does, or nothing is left.
+
+    Of forces that leave nothing it must be asked whether they are any.
+    """
+    fitter = calm.fitter
+    calm.on_progress("random forces")
+    base, root = with_sea(fitter, calm.base), with_sea(fitter, calm.root)
+    search = Search(fitter, calm.workers, calm.on_progress, base, root)
+    found = search.run_from(pushed, is_all=True)
+    left = leftover(fitter, found)
+    return None if left.is_nothing or not is_real(found.names) else Explained(found, search, left, None)
+
+
 def against(plain: Explained, waves: Explanation, best: Explanation) -> Explained | None:
     """What was found among plain waves, where these alone explain more than the best without them."""
     least = as_filtered(plain.search.fitter, best).bic
@@ -201,13 +233,22 @@ def _in_own_waves(search: Search, sets: list[Explanation]) -> list[Explanation]:
 
 def _lean(search: Search, among: Explanation) -> Explanation:
     """The set less what does not pay once the waves are estimated without it: they may do its work."""
-    while among.names:
-        fewer = [search.fitter.reduced(among, among.names - {name}) for name in sorted(among.names)]
+    while names := _doubted(search, among):
+        fewer = [search.fitter.reduced(among, among.names - {name}) for name in names]
         best = min(_in_own_waves(search, fewer), key=lambda e: e.bic)
         if best.bic > among.bic + margin(among):
             break
         among = best
     return among
+
+
+def _doubted(search: Search, among: Explanation) -> list[str]:
+    """The members that waves may do without; of a large set not those that are clearly needed in any."""
+    if len(among.names) <= LARGEST_SET or among.names not in search.tried:
+        return sorted(among.names)
+    found = search.tried[among.names]
+    fewer = zip(sorted(found.names), search.each_without(found, sorted(found.names)), strict=True)
+    return [name for name, one in fewer if one.bic < found.bic + DOUBTED]
 
 
 def _in_waves_of(fitter: Fitter, first: Explanation, names: Names) -> Explanation:
@@ -221,17 +262,31 @@ def _in_waves_of(fitter: Fitter, first: Explanation, names: Names) -> Explanatio
 
 def _searched(known: Search, first: Explanation, least: float) -> tuple[Search, Explanation, Waves]:
     """The search in the waves of `first`; `least` is the BIC of the best without waves."""
-    fitter = known.fitter
+    search = _among(known, first)
+    found, fitted = _beside_own_waves(search, first, search.run([first]))
+    return search, found, _told(known.fitter, fitted, least - first.bic)
+
+
+def _among(known: Search, first: Explanation) -> Search:
+    """A search in the waves of `first`."""
     known.on_progress("in the waves")
-    base, root = (_in_waves_of(fitter, first, one.names) for one in (known.base, known.root))
-    search = Search(fitter, known.workers, known.on_progress, base, root, known.part)
-    found = search.run([first])
-    fitted = first if found.names == first.names else _lean(search, with_waves(fitter, found))
+    base, root = (_in_waves_of(known.fitter, first, one.names) for one in (known.base, known.root))
+    return Search(known.fitter, known.workers, known.on_progress, base, root, known.part)
+
+
+def _beside_own_waves(
+    search: Search, first: Explanation, found: Explanation
+) -> tuple[Explanation, Explanation]:
+    """What was found in the waves of `first`, without what those beside it do, there and among its own."""
+    fitted = first if found.names == first.names else _lean(search, with_waves(search.fitter, found))
     for name in sorted(found.names - fitted.names):
         found = search.without(found, name)
-    model = with_regular_waves(fitter, fitted)
-    theirs = _of_the_waves(fitted)
-    return search, found, Waves(delta_bic=least - first.bic, fitted=fitted, model=model, theirs=theirs)
+    return found, fitted
+
+
+def _told(fitter: Fitter, fitted: Explanation, worth: float) -> Waves:
+    model, theirs = with_regular_waves(fitter, fitted), _of_the_waves(fitted)
+    return Waves(delta_bic=worth, fitted=fitted, model=model, theirs=theirs)
 
 
 def _of_the_waves(fitted: Explanation) -> Names:

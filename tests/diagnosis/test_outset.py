@@ -15,7 +15,7 @@ from host.diagnosis.diagnose import diagnose
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import LITTLE, MUCH
-from host.diagnosis.outset import FAR_LESS, LOST, at_the_outset
+from host.diagnosis.outset import FAR_LESS, LOST, at_the_outset, leads_on
 from host.diagnosis.plane_choice import Way, likelier_first
 from host.diagnosis.search import Search
 from host.read_recordings import read_recordings
@@ -76,14 +76,19 @@ def test_where_it_leads_nowhere_something_may_have_changed(monkeypatch: pytest.M
     assert found is not None
     assert "ballast_change" in found.names
     assert found.leaves_white
+    assert leads_on(fitter, found)
     monkeypatch.setattr(outset, "_beside_a_change", lambda fitter, _: fitter.root)
-    assert at_the_outset(fitter) is None
+    nowhere = at_the_outset(fitter)
+    assert nowhere is not None
+    assert not leads_on(fitter, nowhere)
 
 
 def test_water_that_swings_is_no_change_at_a_moment() -> None:
     fitter = Fitter([hidden_dive(swell, duration=60.0)])
     assert fitter.excess(fitter.root.fit) > LOST
-    assert at_the_outset(fitter) is None
+    found = at_the_outset(fitter)
+    assert found is not None
+    assert not leads_on(fitter, found)
 
 
 @pytest.mark.parametrize(
@@ -118,15 +123,15 @@ def test_a_search_goes_on_with_many_or_begins_with_single_effects(
 
 def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> None:
     def way(root: float, there: float) -> Way:
-        fitter = SimpleNamespace(root=SimpleNamespace(bic=root))
-        fitter.reduced = lambda *_: SimpleNamespace(bic=there)
+        fitter = SimpleNamespace(root=SimpleNamespace(bic=root, fit=2.0 * MUCH), excess=lambda fit: fit)
+        fitter.reduced, fitter.polished = lambda *_: SimpleNamespace(bic=there), lambda one: one
         return Way([], cast("Any", fitter))
 
     def order(*found: Way) -> list[int]:
         told = likelier_first([*found], lambda _: None, 1)
         return [[each.fitter for each in found].index(each.fitter) for each in told]
 
-    whole: Any = SimpleNamespace(bic=-10.0, names=MANY, leaves_white=True)
+    whole: Any = SimpleNamespace(bic=-10.0, names=MANY, leaves_white=True, fit=0.1)
     held, moved, worse = way(-2.0, np.nan), way(-1.0, -11.0), way(-1.0, -9.0)
     monkeypatch.setattr(plane_choice, "at_the_outset", lambda *_: whole)
     monkeypatch.setattr(plane_choice, "plain_waves", None)  # nothing is left to see
@@ -136,6 +141,7 @@ def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> N
     whole.leaves_white = False
     waves: Any = SimpleNamespace(bic=-20.0)
     monkeypatch.setattr(plane_choice, "plain_waves", lambda _: waves)
+    monkeypatch.setattr(plane_choice, "whole_in_waves", lambda *_: None)
     assert [each.outset for each in likelier_first([moved, held], lambda _: None, 1)] == [None, None]
     monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)
     assert order(moved, held) == [0, 1]

@@ -1,0 +1,233 @@
+"""Sets of many in equations that were compiled before; and what is told by random forces or waves at once."""
+
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from hidden_dive import hidden_dive
+from test_seas import in_waves
+
+from host.catalogue import FAINT, ORDINARY
+from host.diagnosis import outset, seas, under_forces
+from host.diagnosis.explanation import Explanation
+from host.diagnosis.fitter import Fitter
+from host.diagnosis.leftover import leftover
+from host.diagnosis.outset import at_the_outset, pushed_by_forces
+from host.diagnosis.plain_waves import plain_waves, whole_in_waves
+from host.diagnosis.sea_fits import with_sea, with_waves
+from host.diagnosis.search import Search
+from host.diagnosis.seas import in_a_swell, pushed_about
+from host.diagnosis.under_forces import CARRIED, climbed, likelihood
+from host.diagnosis.whole_vehicle import is_real
+from host.diagnosis.workers import Workers
+from host.filter_error import filter_error_from
+from host.gauss_newton import Point
+from host.recording import Array
+from host.waves import in_waves_from
+
+SEVERAL = (
+    "heave_pitch_rate_coupling",
+    "pitch_quadratic_damping",
+    "munk_moment",
+    "heave_quadratic_drag",
+    "surge_pitch_coupling",
+)
+
+
+def real_hull(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+    """What acts on a vehicle as they are built, strong enough to be seen in a minute and a half."""
+    w, q = x[0], x[1]
+    return 0.8 * q - 2.0 * w * abs(w), 0.6 * w - 4.0 * q * abs(q), 0.0
+
+
+def jolted(time: float, x: Array, plane: float) -> tuple[float, float, float]:
+    """The same, thrown about twice for a quarter of a minute by what is in no catalogue."""
+    force, moment, climb = real_hull(time, x, plane)
+    throws = 0.12 * np.sin(5.0 * x[2] + 0.9 * time) * (25.0 < time % 50.0 < 40.0)
+    return force, moment + float(throws), climb
+
+
+@pytest.fixture(scope="module")
+def rough() -> tuple[Fitter, Explanation]:
+    """A real vehicle in an irregular sea, and the root among its waves."""
+    fitter = Fitter([hidden_dive(in_waves(real_hull, 0.01, 0.01), duration=90.0)])
+    waves = plain_waves(fitter)
+    assert waves is not None
+    return fitter, waves
+
+
+@pytest.fixture(scope="module")
+def thrown() -> tuple[Fitter, Explanation]:
+    """One that is thrown about, and what all that every vehicle has makes of it."""
+    fitter = Fitter([hidden_dive(jolted, duration=100.0)])
+    whole = at_the_outset(fitter)
+    assert whole is not None
+    return fitter, whole
+
+
+def several(fitter: Fitter, begun: Explanation) -> Explanation:
+    for name in SEVERAL:
+        begun = fitter.grown(begun, name, [])
+    return begun
+
+
+@pytest.mark.parametrize("kind", ["white forces", "waves"])
+def test_wider_equations_change_nothing(kind: str, rough: tuple[Fitter, Explanation]) -> None:
+    fitter, waves = rough
+    found = several(fitter, waves if kind == "waves" else with_sea(fitter, fitter.root))
+    fit = found.fit
+    own = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
+    inputs, free = fitter.inputs(found.names, for_filter=True), fitter.free(found.names)
+    climb = in_waves_from if kind == "waves" else filter_error_from
+    alone = climb(own, inputs, free, 3, holds_noise=True)
+    assert len(CARRIED - found.names) > 2
+    wide, wide_inputs = under_forces._carried(fitter, own)
+    assert wide.structure != own.structure
+    held = np.isin(wide.structure.names, own.structure.names) & fitter.free(
+        frozenset(effect.name for effect in wide.structure.effects)
+    )
+    carried = climb(wide, wide_inputs, held, 3, holds_noise=True).within(own.structure)
+    assert carried.structure == alone.structure
+    assert carried.log_likelihood == pytest.approx(alone.log_likelihood, abs=1e-6)
+    np.testing.assert_allclose(carried.parameters, alone.parameters, rtol=1e-6, atol=1e-9)
+    scale = np.abs(alone.information).max()
+    np.testing.assert_allclose(carried.information, alone.information, atol=1e-6 * scale)
+    for one, other in zip(carried.scores, alone.scores, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-6 * np.abs(other).max())
+    assert likelihood(fitter, own) == pytest.approx(found.fit.log_likelihood, abs=1e-6)
+
+
+def test_few_effects_keep_their_own_equations(thrown: tuple[Fitter, Explanation]) -> None:
+    fitter, _ = thrown
+    fit = with_sea(fitter, fitter.root).fit
+    point = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+    assert under_forces._carried(fitter, point)[0].structure == fit.structure
+
+
+def test_a_fit_that_would_not_get_there_is_given_up(thrown: tuple[Fitter, Explanation]) -> None:
+    fitter, _ = thrown
+    sea = with_sea(fitter, fitter.root)
+    start = Point(sea.fit.structure, 0.7 * sea.fit.parameters, sea.fit.initial, sea.fit.noise)
+    ended = climbed(fitter, start, holds_noise=True)
+    assert ended.iterations > 3
+    early = climbed(fitter, start, True, least=ended.log_likelihood + 1e6)
+    assert early.iterations < ended.iterations
+    assert climbed(fitter, start, True, least=ended.log_likelihood - 1.0).log_likelihood == pytest.approx(
+        ended.log_likelihood
+    )
+
+
+def test_waves_are_narrower_beside_all_that_a_vehicle_has(rough: tuple[Fitter, Explanation]) -> None:
+    fitter, waves = rough
+    whole = at_the_outset(fitter)
+    assert whole is not None
+    assert not whole.leaves_white
+    swell = whole_in_waves(fitter, waves, whole)
+    assert swell is not None
+    assert swell.names == whole.names >= {*ORDINARY, *FAINT}
+    assert swell.leaves_white
+    assert swell.bic < waves.bic - 50.0
+    assert swell.fit.waves[1] < waves.fit.waves[1]
+    likely = Explanation(whole.names, whole.fit, swell.bic)
+    assert whole_in_waves(fitter, waves, likely) is None  # without waves it is as likely
+    assert whole_in_waves(fitter, Explanation(waves.names, waves.fit, -1e9), whole) is None
+
+
+def test_the_search_among_waves_begins_with_all_of_it(
+    rough: tuple[Fitter, Explanation], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitter, waves = rough
+    swell = with_waves(fitter, several(fitter, waves))
+    few = frozenset({"heave_pitch_rate_coupling"})
+    with Workers(fitter, 1) as workers:
+        calm = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        kept = fitter.reduced(swell, frozenset({*SEVERAL}))
+        monkeypatch.setattr(Search, "run_from", lambda *_: kept)
+        monkeypatch.setattr(seas, "_lean", lambda _, fitted: fitted)
+        told = in_a_swell(calm, swell)
+        assert told is not None
+        assert told.waves is not None
+        assert told.best.names == kept.names
+        assert told.left.is_nothing
+        assert told.waves.delta_bic > 100.0  # white forces in the place of the waves are far less likely
+        monkeypatch.setattr(Search, "run_from", lambda *_: fitter.reduced(swell, few))
+        assert in_a_swell(calm, swell) is None
+
+
+def test_only_doubtful_members_are_asked_in_their_own_waves(
+    rough: tuple[Fitter, Explanation], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitter, waves = rough
+    many = fitter.reduced(several(fitter, waves), frozenset({*SEVERAL}))
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        search.remember(many)
+        worth = dict.fromkeys(SEVERAL, 1.0) | {"munk_moment": 2.0 * seas.DOUBTED}
+        fewer = lambda _, best, names: [Explanation(best.names, best.fit, best.bic + worth[n]) for n in names]  # noqa: E731
+        monkeypatch.setattr(Search, "each_without", fewer)
+        assert seas._doubted(search, many) == sorted({*SEVERAL} - {"munk_moment"})
+        one = fitter.reduced(many, frozenset({"munk_moment"}))
+        assert seas._doubted(search, one) == ["munk_moment"]
+
+
+def test_what_pushes_a_vehicle_about_is_told_by_random_forces(thrown: tuple[Fitter, Explanation]) -> None:
+    fitter, whole = thrown
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        pushed = pushed_by_forces(search, whole)
+        assert pushed is not None
+        assert pushed.names == whole.names
+        assert pushed.fit.has_process_noise
+
+
+@pytest.mark.long
+def test_what_pays_beside_them_is_named(thrown: tuple[Fitter, Explanation]) -> None:
+    fitter, whole = thrown
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        told = pushed_about(search, with_sea(fitter, whole))
+        assert told is not None
+        assert not told.left.is_nothing  # a sea would push all the time
+        assert told.waves is None
+        assert "heave_pitch_rate_coupling" in told.best.names
+        assert is_real(told.best.names)
+        assert told.best.fit.has_process_noise
+
+
+@pytest.mark.parametrize("why", ["little is left", "lost", "large forces", "as likely", "by speed", "gains"])
+def test_else_the_search_goes_its_way(
+    why: str, thrown: tuple[Fitter, Explanation], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitter, whole = thrown
+    left = {"little is left": 1.1, "lost": 30.0}.get(why, 3.0)
+    monkeypatch.setattr(fitter, "excess", lambda _: left)
+    if why == "large forces":
+        monkeypatch.setattr(outset, "MOST_FORCES", 1e-9)
+    if why == "as likely":
+        monkeypatch.setattr(outset, "FAR_LIKELIER", 1e3)
+    monkeypatch.setattr(outset, "are_by_speed", lambda *_: why == "by speed")
+    gains = {"ballast_change": 500.0 if why == "gains" else 1.0}
+    search: Any = type("S", (), {"fitter": fitter, "gains": lambda *_: gains})()
+    assert pushed_by_forces(cast("Search", search), whole) is None
+
+
+def test_forces_that_leave_nothing_must_be_asked_for(
+    thrown: tuple[Fitter, Explanation], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitter, whole = thrown
+    sea = with_sea(fitter, whole)
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        monkeypatch.setattr(Search, "run_from", lambda *_, **__: sea)
+        assert pushed_about(search, sea) is not None
+        nothing = leftover(fitter, sea).__class__(
+            is_coloured=False,
+            is_local=False,
+            is_by_speed=False,
+            is_no_sea=False,
+            is_above_floor=False,
+            smooth_gain=0.0,
+            is_smooth=False,
+        )
+        monkeypatch.setattr(seas, "leftover", lambda *_: nothing)
+        assert pushed_about(search, sea) is None
