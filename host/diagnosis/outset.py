@@ -35,6 +35,7 @@ LOST = 20.0  # times the noise floor: no hull leaves so much by what it is, but 
 MOST_FORCES = 0.1  # of the variance of all force: what acts is known but for a tenth
 FAR_LIKELIER = 0.1  # of BIC a sample, under random forces
 FAIR_PART = 0.02  # of what these explain, that what is missing should gain even beside them
+TURNING = ("munk_moment", "heave_pitch_rate_coupling")
 LEADING = 3  # changes, beside which all the rest is tried
 
 
@@ -112,10 +113,18 @@ def goes_on_from(search: "Search", joint: Explanation) -> bool:
 
 
 def _starts(fitter: Fitter, names: Names) -> Iterator[Point]:
-    """Beside the root and a linear hull, where what joins hardly acts, and by what a regression says."""
-    root, linear = (
-        begun_beside(fitter, Point(fit.structure, fit.parameters, fit.initial, fit.levels), names)
-        for fit in (fitter.root.fit, fitter.linear.fit)
-    )
-    yield from (root, linear)
+    """Beside the root and a hull that turns, where what joins hardly acts, and by what a regression says.
+
+    Without a servo's lag, which alone takes a pole of the hull and leads elsewhere.
+    """
+    hull = fitter.root
+    yield (root := _beside(fitter, hull, names))
+    for name in TURNING:
+        hull = fitter.grown(hull, name, [])
+    yield _beside(fitter, hull, names)
     yield guess(fitter, root, names)
+
+
+def _beside(fitter: Fitter, found: Explanation, names: Names) -> Point:
+    fit = found.fit
+    return begun_beside(fitter, Point(fit.structure, fit.parameters, fit.initial, fit.levels), names)
