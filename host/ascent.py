@@ -18,7 +18,7 @@ from host.recording import Array
 
 DIFFERENCE = 1e-3  # of a log noise level, or of one that has a sign, for derivatives
 LONGEST_STRIDE = 2.5  # of the same in one step
-SETTLED = 0.02  # of the log-likelihood: a step that gains less is the last
+SETTLED = 0.02  # of the log-likelihood, by a step that is the last
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e6
 FALSE_PROMISE = 10.0  # of the log-likelihood, by a step that gained nothing: its slopes are not the true ones
 QUICKER = 3.0  # times the pace of its last step, that a search may still gain
@@ -85,12 +85,14 @@ def ascend(
     holds_noise: bool = False,
     holds_gain: bool = False,
     least: float = -np.inf,
+    settled: float = SETTLED,
 ) -> tuple[Place[P], int, bool]:
     """Climbs from a point; gives where it ended, after how many steps, and whether it had converged.
 
     holds_noise  whether the noise levels stay as they are, which saves most of the work
     holds_gain   whether no step asks how the gain moves with the parameters
     least        a log-likelihood: it gives up where three times the pace of its last step would not get there
+    settled      of the log-likelihood: a step that gains less is the last
     """
     here, damping, converged, used = place(point, model), FIRST_DAMPING, False, 0
     while not converged and used < most_steps and np.isfinite(here.likelihood):
@@ -98,11 +100,11 @@ def ascend(
         step = GaussNewton(model.whitened(here.point, here.passes), here.point, free)
         scoring = None if holds_noise else _Scoring(here, model)
         there, damping = _uphill(here, model, step, scoring, damping)
-        is_stuck = not there.likelihood - here.likelihood > SETTLED
+        is_stuck = not there.likelihood - here.likelihood > settled
         if is_stuck and not holds_gain and step.promise() > FALSE_PROMISE:
             there, damping = _uphill(here, model, _scored(here, model, step), scoring, FIRST_DAMPING)
         gained = there.likelihood - here.likelihood
-        converged = not gained > SETTLED
+        converged = not gained > settled
         if gained > 0.0:
             here = there
         damping /= 20.0

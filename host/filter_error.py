@@ -5,7 +5,7 @@ Source: Maine and Iliff, NASA RP-1138; Klein and Morelli, Aircraft System Identi
 
 import numpy as np
 
-from host.ascent import ascend, place
+from host.ascent import SETTLED, ascend, place
 from host.fit import Fit, finished, run_away
 from host.gauss_newton import Mask, Point, whiten
 from host.kalman import KalmanPass, kalman_pass
@@ -55,13 +55,15 @@ def filter_error_from(
     holds_noise: bool = False,
     holds_gain: bool = False,
     least: float = -np.inf,
+    settled: float = SETTLED,
 ) -> Fit:
     """The same from any point with forces; or the parameters alone, under these very forces.
 
-    least  a log-likelihood: given up where it would not get there
+    least    a log-likelihood: given up where it would not get there
+    settled  of the log-likelihood: a step that gains less is the last
     """
     model = RandomForces(inputs)
-    end, used, converged = ascend(point, model, free, most_steps, holds_noise, holds_gain, least)
+    end, used, converged = ascend(point, model, free, most_steps, holds_noise, holds_gain, least, settled)
     if not np.isfinite(end.likelihood):
         return run_away(point, inputs, free)
     white = model.whitened(end.point, end.passes)

@@ -20,7 +20,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from host.ascent import ascend, place
+from host.ascent import SETTLED, ascend, place
 from host.catalogue.environment import WAVE_PERIODS
 from host.catalogue.gravity import GRAVITY
 from host.equations import Chain, Effect, Parameter, Structure
@@ -136,10 +136,12 @@ def in_waves_from(
     most_steps: int = MOST_STEPS,
     holds_noise: bool = False,
     least: float = -np.inf,
+    settled: float = SETTLED,
 ) -> Fit:
     """The same from any point with waves in its noise (7,); or the parameters alone, in these very waves.
 
-    least  a log-likelihood: given up where it would not get there
+    least    a log-likelihood: given up where it would not get there
+    settled  of the log-likelihood: a step that gains less is the last
 
     A full climb goes from another heave damping, too: waves hide which valley is the vehicle's.
     """
@@ -147,7 +149,7 @@ def in_waves_from(
     wider_free = np.concatenate([free, np.zeros(len(SHAPE), dtype=bool)])
     # Waves excuse much: how the gain moves with the parameters counts for little while sets are compared.
     best, used, converged = ascend(
-        wider, model, wider_free, most_steps, holds_noise, holds_gain=holds_noise, least=least
+        wider, model, wider_free, most_steps, holds_noise, holds_noise, least, settled
     )
     if most_steps > FIRST_STEPS and not holds_noise:
         starts = with_usual_heave(best.point)

@@ -107,10 +107,16 @@ def explain(
 
 
 def _begun_with_all(search: Search, way: Way) -> Explained | None:
-    """What is found from all that every vehicle has among waves or random forces, where these were told."""
-    if way.swell is not None:
-        return in_a_swell(search, way.swell)
-    return None if way.pushed is None else pushed_about(search, way.pushed)
+    """What is found from all that every vehicle has among waves or random forces, where these were told.
+
+    And among waves without which all of it is far from the recording.
+    """
+    if way.pushed is not None:
+        return pushed_about(search, way.pushed)
+    found = None if way.swell is None else in_a_swell(search, way.swell)
+    if found is None and way.waves is not None and way.calm is not None:
+        return against(in_plain_waves(search, way.waves), way.waves, way.calm)
+    return found
 
 
 class _PlainWaves:

@@ -295,7 +295,7 @@ class Fitter:
         inputs, free = self.inputs(names), self.free(names)
         least = -np.inf if rival is None else rival.log_likelihood
         if starts[0].noise[2:].any():
-            ends = [climbed(self, start, True, least - MADE_UP_FOR) for start in starts]
+            ends = [climbed(self, start, True, least - MADE_UP_FOR, TOLERANCE) for start in starts]
             return max(ends, key=lambda fit: fit.log_likelihood)
         hopeless = least - (0.0 if rival is None else HOPELESS * rival.samples)
         fits = [output_error(start, inputs, free, first, TOLERANCE, hopeless) for start in starts]

@@ -9,10 +9,10 @@ import numpy as np
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.margins import LARGEST_SET, NAMING_MARGIN, margin
+from host.diagnosis.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, margin
 from host.diagnosis.outset import at_the_outset, leads_on, pushed_by_forces, says_all
 from host.diagnosis.plain_waves import plain_waves, whole_in_waves
-from host.diagnosis.sea_fits import with_waves
+from host.diagnosis.sea_fits import as_filtered, with_waves
 from host.diagnosis.search import Search
 from host.diagnosis.spans import divide, excerpt
 from host.diagnosis.whole_vehicle import is_real, with_all_ordinary
@@ -20,6 +20,7 @@ from host.diagnosis.workers import Workers
 from host.plane_between_rows import with_moving_plane
 from host.recording import Recording
 
+FAR_LIKELIER = 1.0  # of BIC a sample: what no search without waves makes up for
 CONTENDERS = 10  # sets that are tried with the plane the other way
 LEADING = 3  # single effects, of which the likeliest often is a part of the truth
 
@@ -30,6 +31,7 @@ class Way(NamedTuple):
     waves  the root among waves, where these are plain to see
     outset  the root with all that every vehicle has, where that leaves nothing, or next to nothing
     swell  the same among waves that are estimated beside it, where that leaves nothing
+    calm    the same without waves, where these alone explain far more
     pushed  the same under random forces, where nothing in the catalogue gains beside these
     alone  each effect alone, where these were fitted
     """
@@ -39,6 +41,7 @@ class Way(NamedTuple):
     waves: Explanation | None = None
     outset: Explanation | None = None
     swell: Explanation | None = None
+    calm: Explanation | None = None
     pushed: Explanation | None = None
     alone: tuple[Explanation, ...] = ()
 
@@ -99,9 +102,13 @@ def _in_a_swell(seen: list[Way], whole: Explanation | None) -> list[Way]:
     leading, *others = seen
     if whole is None or leading.waves is None:
         return seen
-    swell = whole_in_waves(leading.fitter, leading.waves, whole)
+    fitter, waves = leading.fitter, leading.waves
+    lost = as_filtered(fitter, whole).bic - waves.bic
+    if lost > FAR_LIKELIER * whole.fit.samples and fitter.excess(waves.fit) < LITTLE:
+        leading = leading._replace(calm=whole)
+    swell = whole_in_waves(fitter, waves, whole)
     if swell is None:
-        return seen
+        return [leading, *others]
     begun = [leading._replace(swell=swell)]
     begun += [way._replace(swell=way.fitter.reduced(swell, swell.names)) for way in others]
     return sorted(begun, key=lambda way: inf if way.swell is None else way.swell.bic)

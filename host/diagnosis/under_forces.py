@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from host.ascent import SETTLED
 from host.catalogue import FAINT, ORDINARY, named, structure_of
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Names
@@ -30,24 +31,33 @@ CARRIED = frozenset(
 """What acts nowhere where its coefficients are zero, and moves no state of its own."""
 
 
-def climbed(fitter: "Fitter", start: Point, holds_noise: bool, least: float = -np.inf) -> Fit:
+def climbed(
+    fitter: "Fitter", start: Point, holds_noise: bool, least: float = -np.inf, settled: float = SETTLED
+) -> Fit:
     """The likeliest parameters of the start's set, from there.
 
     While sets are compared, forces stay as they were first found (`holds_noise`), and waves to the end. Their
     levels take most of the time, and a set that is better than another is so at any of them.
 
-    least  a log-likelihood: given up where it would not get there
+    least    a log-likelihood: given up where it would not get there
+    settled  of the log-likelihood: a step that gains less is the last
     """
     names = frozenset(effect.name for effect in start.structure.effects)
     wider, inputs = _carried(fitter, start)
     own = dict(zip(start.structure.names, fitter.free(names).tolist(), strict=True))
     free = np.array([own.get(name, False) for name in wider.structure.names])
     if start.noise.size > 4:
-        fit = in_waves_from(wider, inputs, free, holds_noise=True, least=least)
+        fit = in_waves_from(wider, inputs, free, holds_noise=True, least=least, settled=settled)
     else:
         gain_held = not fitter.are_slight(start.noise)
         fit = filter_error_from(
-            wider, inputs, free, holds_noise=holds_noise, holds_gain=gain_held, least=least
+            wider,
+            inputs,
+            free,
+            holds_noise=holds_noise,
+            holds_gain=gain_held,
+            least=least,
+            settled=settled,
         )
     return fit.within(start.structure)
 

@@ -85,7 +85,7 @@ def explained(
     monkeypatch.setattr(module, "unknown_in", lambda one: [n for n in one.names if n.startswith("unknown_")])
     monkeypatch.setattr(module, "leanest", lambda _, best: best)
     fitter: Any = SimpleNamespace(base=None, root=None)
-    way: Any = SimpleNamespace(waves=waves, outset=None, swell=None, pushed=None, alone=())
+    way: Any = SimpleNamespace(waves=waves, outset=None, swell=None, calm=None, pushed=None, alone=())
     return module.explain(fitter, cast("Any", None), lambda _: None, way), was_for_few
 
 

@@ -141,7 +141,7 @@ def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> N
     whole.leaves_white = False
     waves: Any = SimpleNamespace(bic=-20.0)
     monkeypatch.setattr(plane_choice, "plain_waves", lambda _: waves)
-    monkeypatch.setattr(plane_choice, "whole_in_waves", lambda *_: None)
+    monkeypatch.setattr(plane_choice, "_in_a_swell", lambda seen, _: seen)
     assert [each.outset for each in likelier_first([moved, held], lambda _: None, 1)] == [None, None]
     monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)
     assert order(moved, held) == [0, 1]

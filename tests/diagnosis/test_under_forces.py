@@ -8,15 +8,17 @@ from hidden_dive import hidden_dive
 from test_seas import in_waves
 
 from host.catalogue import FAINT, ORDINARY
-from host.diagnosis import outset, seas, under_forces
+from host.diagnosis import explain, outset, plane_choice, seas, under_forces
+from host.diagnosis.explain import _begun_with_all
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
 from host.diagnosis.outset import at_the_outset, pushed_by_forces
 from host.diagnosis.plain_waves import plain_waves, whole_in_waves
+from host.diagnosis.plane_choice import Way, _in_a_swell
 from host.diagnosis.sea_fits import with_sea, with_waves
 from host.diagnosis.search import Search
-from host.diagnosis.seas import in_a_swell, pushed_about
+from host.diagnosis.seas import Explained, in_a_swell, pushed_about
 from host.diagnosis.under_forces import CARRIED, climbed, likelihood
 from host.diagnosis.whole_vehicle import is_real
 from host.diagnosis.workers import Workers
@@ -168,6 +170,41 @@ def test_only_doubtful_members_are_asked_in_their_own_waves(
         assert seas._doubted(search, many) == sorted({*SEVERAL} - {"munk_moment"})
         one = fitter.reduced(many, frozenset({"munk_moment"}))
         assert seas._doubted(search, one) == ["munk_moment"]
+
+
+def test_waves_without_which_all_is_far_off_need_no_calm_search(
+    rough: tuple[Fitter, Explanation], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitter, waves = rough
+    whole = fitter.root  # what is known of it here is how likely it is
+    ways = [Way([], fitter, waves=waves), Way([], fitter, waves=waves)]
+    monkeypatch.setattr(plane_choice, "whole_in_waves", lambda *_: None)
+    monkeypatch.setattr(plane_choice, "LITTLE", 2.0)
+    assert _in_a_swell(ways, whole)[0].calm is whole
+    assert _in_a_swell(ways, Explanation(whole.names, whole.fit, waves.bic + 100.0))[0].calm is None
+    assert _in_a_swell(ways, None) is ways
+    monkeypatch.setattr(plane_choice, "LITTLE", 0.5)  # so much is left among them that they are doubtful
+    assert _in_a_swell(ways, whole)[0].calm is None
+    swell = Explanation(waves.names, waves.fit, waves.bic - 50.0)
+    monkeypatch.setattr(plane_choice, "whole_in_waves", lambda *_: swell)
+    monkeypatch.setattr(fitter, "reduced", lambda *_: Explanation(waves.names, waves.fit, waves.bic - 90.0))
+    first, second = _in_a_swell(ways, whole)
+    assert first.swell is not None
+    assert first.swell.bic < swell.bic
+    assert second.swell is swell
+
+    asked: list[str] = []
+    among = Explained(waves, cast("Search", None), cast("Any", None), None)
+    monkeypatch.setattr(explain, "in_a_swell", lambda *_: asked.append("swell"))
+    monkeypatch.setattr(explain, "in_plain_waves", lambda *_: asked.append("plain") or among)
+    monkeypatch.setattr(explain, "against", lambda found, *_: found)
+    monkeypatch.setattr(explain, "pushed_about", lambda *_: asked.append("pushed") or among)
+    search = cast("Search", None)
+    assert _begun_with_all(search, second._replace(calm=None)) is None
+    assert _begun_with_all(search, second._replace(calm=whole)) is among
+    assert _begun_with_all(search, Way([], fitter)) is None
+    assert _begun_with_all(search, Way([], fitter, pushed=waves)) is among
+    assert asked == ["swell", "swell", "plain", "pushed"]
 
 
 def test_what_pushes_a_vehicle_about_is_told_by_random_forces(thrown: tuple[Fitter, Explanation]) -> None:
