@@ -152,7 +152,7 @@ def _diagnosed(
         with Workers(fitter, jobs) as workers:
             explained = explain(fitter, workers, on_progress, way, explained)
             judged = _judge(explained, spans, floor, on_progress)
-    best, search, left, waves = explained
+    best, search, left, waves, _ = explained
     on_progress("final fit on everything")
     base = _refitted(search.base, recordings)
     found = extended = _refitted(best if waves is None else waves.fitted, recordings)
@@ -205,7 +205,7 @@ def _is_likelier(other: Way, explained: Explained) -> bool:
 
 def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callable[[str], None]) -> Judged:
     """Scores on held-out spans; what each effect is worth, and the slots."""
-    best, search, left, waves = explained
+    best, search, left, waves, _ = explained
     model = best if waves is None else waves.model
     on_progress("held-out check")
     horizon = _horizon(left)

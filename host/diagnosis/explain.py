@@ -18,6 +18,7 @@ from host.diagnosis.search import Search
 from host.diagnosis.seas import (
     Explained,
     again_astray,
+    again_in_a_swell,
     against,
     among_waves,
     explains_more,
@@ -45,7 +46,9 @@ def explain(
 
     is_second  the plane was taken the other way before, and all searched so
     """
-    if part is not None and part.left.is_by_speed:
+    if part is not None and part.is_of_all and part.waves is not None:
+        return again_in_a_swell(fitter, workers, on_progress, part, part.waves)
+    if part is not None and (part.is_of_all or part.left.is_by_speed):
         return again_astray(fitter, workers, on_progress, part)
     known = None if part is None else part.search
     if part is not None and part.best.fit.has_coloured_noise:

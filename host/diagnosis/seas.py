@@ -17,6 +17,7 @@ from host.diagnosis.leftover import Leftover, leftover
 from host.diagnosis.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, ROUGH, margin
 from host.diagnosis.sea_fits import (
     WAVES,
+    again_in_waves,
     again_under_forces,
     as_filtered,
     with_regular_waves,
@@ -51,12 +52,16 @@ class Waves:
 
 
 class Explained(NamedTuple):
-    """The best explanation, the search that found it, what it leaves, and the waves it was found among."""
+    """The best explanation, the search that found it, what it leaves, and the waves it was found among.
+
+    is_of_all  it was found from all that every vehicle has, among waves or random forces at once
+    """
 
     best: Explanation
     search: Search
     left: Leftover
     waves: Waves | None
+    is_of_all: bool = False
 
 
 def evidence(waves: Waves | None) -> float:
@@ -164,7 +169,17 @@ def in_a_swell(calm: Search, swell: Explanation) -> Explained | None:
     found, fitted = _beside_own_waves(search, swell, found)
     left = leftover(fitter, fitted)
     told = _told(fitter, fitted, with_sea(fitter, fitted).bic - fitted.bic)
-    return Explained(found, search, left, told) if left.is_nothing else None
+    return Explained(found, search, left, told, is_of_all=True) if left.is_nothing else None
+
+
+def again_in_a_swell(
+    fitter: Fitter, workers: Workers, on_progress: Callable[[str], None], part: Explained, waves: Waves
+) -> Explained:
+    """What was found so on a part of the recordings, on the whole of them in the same waves."""
+    calm = Search(fitter, workers, on_progress, fitter.base, fitter.root, part.search)
+    first = again_in_waves(fitter, waves.fitted)
+    search, found, told = _searched(calm, first, with_sea(fitter, first).bic)
+    return Explained(found, search, leftover(fitter, told.fitted), told)
 
 
 def pushed_about(calm: Search, pushed: Explanation) -> Explained | None:
@@ -178,7 +193,9 @@ def pushed_about(calm: Search, pushed: Explanation) -> Explained | None:
     search = Search(fitter, calm.workers, calm.on_progress, base, root)
     found = search.run_from(pushed, is_all=True)
     left = leftover(fitter, found)
-    return None if left.is_nothing or not is_real(found.names) else Explained(found, search, left, None)
+    if left.is_nothing or not is_real(found.names):
+        return None
+    return Explained(found, search, left, None, is_of_all=True)
 
 
 def against(plain: Explained, waves: Explanation, best: Explanation) -> Explained | None:

@@ -18,7 +18,7 @@ from host.diagnosis.plain_waves import plain_waves, whole_in_waves
 from host.diagnosis.plane_choice import Way, _in_a_swell
 from host.diagnosis.sea_fits import with_sea, with_waves
 from host.diagnosis.search import Search
-from host.diagnosis.seas import Explained, in_a_swell, pushed_about
+from host.diagnosis.seas import Explained, Waves, in_a_swell, pushed_about
 from host.diagnosis.under_forces import CARRIED, climbed, likelihood
 from host.diagnosis.whole_vehicle import is_real
 from host.diagnosis.workers import Workers
@@ -154,6 +154,32 @@ def test_the_search_among_waves_begins_with_all_of_it(
         assert told.waves.delta_bic > 100.0  # white forces in the place of the waves are far less likely
         monkeypatch.setattr(Search, "run_from", lambda *_: fitter.reduced(swell, few))
         assert in_a_swell(calm, swell) is None
+
+
+def test_on_the_whole_the_same_waves_are_kept(
+    rough: tuple[Fitter, Explanation], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitter, waves = rough
+    swell = with_waves(fitter, fitter.reduced(several(fitter, waves), frozenset({*SEVERAL})))
+    whole = Fitter([hidden_dive(in_waves(real_hull, 0.01, 0.01), duration=120.0)])
+    told = Waves(delta_bic=500.0, fitted=swell, model=swell, theirs=frozenset())
+    monkeypatch.setattr(seas, "_lean", lambda _, fitted: fitted)
+    with Workers(fitter, 1) as workers, Workers(whole, 1) as others:
+        known = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        known.remember(swell)
+        part = Explained(swell, known, leftover(fitter, swell), told, is_of_all=True)
+        monkeypatch.setattr(Search, "run", lambda _, also: also[0])
+        found = explain.explain(whole, others, lambda _: None, Way([], whole), part)
+        assert found.waves is not None
+        assert found.best.fit.samples > swell.fit.samples
+        assert found.best.names == {*SEVERAL}
+        np.testing.assert_array_equal(found.best.fit.waves, swell.fit.waves)
+        assert found.waves.delta_bic > 100.0
+        astray: list[Explained] = []
+        monkeypatch.setattr(explain, "again_astray", lambda *given: astray.append(given[-1]) or part)
+        pushed = part._replace(waves=None)
+        assert explain.explain(whole, others, lambda _: None, Way([], whole), pushed) is part
+        assert astray == [pushed]
 
 
 def test_only_doubtful_members_are_asked_in_their_own_waves(
