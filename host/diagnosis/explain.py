@@ -5,6 +5,7 @@ from functools import cached_property
 
 from host.catalogue import UNKNOWN
 from host.catalogue.nuisance import FREE_TRIM
+from host.diagnosis.all_at_sea import again_in_a_swell, in_a_swell, pushed_about
 from host.diagnosis.drifts import again_in_drift, among_drift, in_drift
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
@@ -18,15 +19,12 @@ from host.diagnosis.search import Search
 from host.diagnosis.seas import (
     Explained,
     again_astray,
-    again_in_a_swell,
     against,
     among_waves,
     explains_more,
     in_a_sea,
-    in_a_swell,
     in_plain_waves,
     led_astray,
-    pushed_about,
 )
 from host.diagnosis.unknown_physics import unknown_in, with_unknown
 from host.diagnosis.workers import Workers
@@ -115,7 +113,7 @@ def _begun_with_all(search: Search, way: Way) -> Explained | None:
     And among waves without which all of it is far from the recording.
     """
     if way.pushed is not None:
-        return pushed_about(search, way.pushed)
+        return pushed_about(search, way.pushed, are_far_likelier=way.calm is not None)
     found = None if way.swell is None else in_a_swell(search, way.swell)
     if found is None and way.waves is not None and way.calm is not None:
         return against(in_plain_waves(search, way.waves), way.waves, way.calm)

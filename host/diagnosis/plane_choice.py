@@ -31,7 +31,7 @@ class Way(NamedTuple):
     waves  the root among waves, where these are plain to see
     outset  the root with all that every vehicle has, where that leaves nothing, or next to nothing
     swell  the same among waves that are estimated beside it, where that leaves nothing
-    calm    the same without waves, where these alone explain far more
+    calm    the same without waves or random forces, where these explain far more
     pushed  the same under random forces, where nothing in the catalogue gains beside these
     alone  each effect alone, where these were fitted
     """
@@ -119,13 +119,15 @@ def _pushed_about(
 ) -> list[Way]:
     """The ways as all that every vehicle has under random forces sees them, where these explain the rest."""
     leading, *others = found
-    with Workers(leading.fitter, jobs) as workers:
-        fitter = leading.fitter
+    fitter = leading.fitter
+    with Workers(fitter, jobs) as workers:
         pushed = pushed_by_forces(Search(fitter, workers, on_progress, fitter.base, fitter.root), whole)
     if pushed is None:
         return []
-    begun = [leading._replace(pushed=pushed)]
-    begun += [way._replace(pushed=way.fitter.reduced(pushed, pushed.names)) for way in others]
+    is_far = as_filtered(fitter, whole).bic > pushed.bic + FAR_LIKELIER * pushed.fit.samples
+    calm = whole if is_far else None
+    begun = [leading._replace(pushed=pushed, calm=calm)]
+    begun += [way._replace(pushed=way.fitter.reduced(pushed, pushed.names), calm=calm) for way in others]
     return sorted(begun, key=lambda way: inf if way.pushed is None else way.pushed.bic)
 
 

@@ -17,7 +17,6 @@ from host.diagnosis.leftover import Leftover, leftover
 from host.diagnosis.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, ROUGH, margin
 from host.diagnosis.sea_fits import (
     WAVES,
-    again_in_waves,
     again_under_forces,
     as_filtered,
     with_regular_waves,
@@ -27,7 +26,6 @@ from host.diagnosis.sea_fits import (
 from host.diagnosis.search import Search
 from host.diagnosis.speed_forces import are_by_speed
 from host.diagnosis.trims import retrimmed
-from host.diagnosis.whole_vehicle import is_real
 from host.diagnosis.workers import Workers
 from host.waves import is_sea, mean_moment
 
@@ -152,50 +150,8 @@ def in_plain_waves(calm: Search, waves: Explanation) -> Explained:
 
     Where something is left then, what is hidden may only pass for waves.
     """
-    search, found, told = _searched(calm, waves, as_filtered(calm.fitter, calm.root).bic)
+    search, found, told = searched_among(calm, waves, as_filtered(calm.fitter, calm.root).bic)
     return Explained(found, search, leftover(calm.fitter, told.fitted), told)
-
-
-def in_a_swell(calm: Search, swell: Explanation) -> Explained | None:
-    """The search from all that every vehicle has among waves estimated beside it; None if few of it pay.
-
-    Or if something is left: as no search without waves was made, nothing speaks for them then.
-    """
-    fitter = calm.fitter
-    search = _among(calm, swell)
-    found = search.run_from(swell)
-    if not is_real(found.names):
-        return None
-    found, fitted = _beside_own_waves(search, swell, found)
-    left = leftover(fitter, fitted)
-    told = _told(fitter, fitted, with_sea(fitter, fitted).bic - fitted.bic)
-    return Explained(found, search, left, told, is_of_all=True) if left.is_nothing else None
-
-
-def again_in_a_swell(
-    fitter: Fitter, workers: Workers, on_progress: Callable[[str], None], part: Explained, waves: Waves
-) -> Explained:
-    """What was found so on a part of the recordings, on the whole of them in the same waves."""
-    calm = Search(fitter, workers, on_progress, fitter.base, fitter.root, part.search)
-    first = again_in_waves(fitter, waves.fitted)
-    search, found, told = _searched(calm, first, with_sea(fitter, first).bic)
-    return Explained(found, search, leftover(fitter, told.fitted), told)
-
-
-def pushed_about(calm: Search, pushed: Explanation) -> Explained | None:
-    """What pays of all that every vehicle has under random forces; None if little does, or nothing is left.
-
-    Of forces that leave nothing it must be asked whether they are any.
-    """
-    fitter = calm.fitter
-    calm.on_progress("random forces")
-    base, root = with_sea(fitter, calm.base), with_sea(fitter, calm.root)
-    search = Search(fitter, calm.workers, calm.on_progress, base, root)
-    found = search.run_from(pushed, is_all=True)
-    left = leftover(fitter, found)
-    if left.is_nothing or not is_real(found.names):
-        return None
-    return Explained(found, search, left, None, is_of_all=True)
 
 
 def against(plain: Explained, waves: Explanation, best: Explanation) -> Explained | None:
@@ -240,7 +196,7 @@ def among_waves(
     first, least = _lean(rough, first), as_filtered(fitter, best).bic
     if first.bic > least - NAMING_MARGIN or not is_sea(first.fit):
         return rough, best, None
-    return _searched(rough, first, least)
+    return searched_among(rough, first, least)
 
 
 def _in_own_waves(search: Search, sets: list[Explanation]) -> list[Explanation]:
@@ -277,21 +233,21 @@ def _in_waves_of(fitter: Fitter, first: Explanation, names: Names) -> Explanatio
     return fitter.explained(names, fitter.carried_on(start))
 
 
-def _searched(known: Search, first: Explanation, least: float) -> tuple[Search, Explanation, Waves]:
-    """The search in the waves of `first`; `least` is the BIC of the best without waves."""
-    search = _among(known, first)
-    found, fitted = _beside_own_waves(search, first, search.run([first]))
-    return search, found, _told(known.fitter, fitted, least - first.bic)
+def searched_among(known: Search, first: Explanation, least: float) -> tuple[Search, Explanation, Waves]:
+    """The search in the waves of `first`; `least` is the BIC of the best without them."""
+    search = search_among(known, first)
+    found, fitted = beside_own_waves(search, first, search.run([first]))
+    return search, found, told_waves(known.fitter, fitted, least - first.bic)
 
 
-def _among(known: Search, first: Explanation) -> Search:
+def search_among(known: Search, first: Explanation) -> Search:
     """A search in the waves of `first`."""
     known.on_progress("in the waves")
     base, root = (_in_waves_of(known.fitter, first, one.names) for one in (known.base, known.root))
     return Search(known.fitter, known.workers, known.on_progress, base, root, known.part)
 
 
-def _beside_own_waves(
+def beside_own_waves(
     search: Search, first: Explanation, found: Explanation
 ) -> tuple[Explanation, Explanation]:
     """What was found in the waves of `first`, without what those beside it do, there and among its own."""
@@ -301,7 +257,8 @@ def _beside_own_waves(
     return found, fitted
 
 
-def _told(fitter: Fitter, fitted: Explanation, worth: float) -> Waves:
+def told_waves(fitter: Fitter, fitted: Explanation, worth: float) -> Waves:
+    """The waves that a set was found among, with what they are worth."""
     model, theirs = with_regular_waves(fitter, fitted), _of_the_waves(fitted)
     return Waves(delta_bic=worth, fitted=fitted, model=model, theirs=theirs)
 

@@ -8,7 +8,8 @@ from hidden_dive import hidden_dive
 from test_seas import in_waves
 
 from host.catalogue import FAINT, ORDINARY
-from host.diagnosis import explain, outset, plane_choice, seas, under_forces
+from host.diagnosis import all_at_sea, explain, outset, plane_choice, seas, under_forces
+from host.diagnosis.all_at_sea import in_a_swell, pushed_about
 from host.diagnosis.explain import _begun_with_all
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
@@ -18,7 +19,7 @@ from host.diagnosis.plain_waves import plain_waves, whole_in_waves
 from host.diagnosis.plane_choice import Way, _in_a_swell
 from host.diagnosis.sea_fits import with_sea, with_waves
 from host.diagnosis.search import Search
-from host.diagnosis.seas import Explained, Waves, in_a_swell, pushed_about
+from host.diagnosis.seas import Explained, Waves
 from host.diagnosis.under_forces import CARRIED, climbed, likelihood
 from host.diagnosis.whole_vehicle import is_real
 from host.diagnosis.workers import Workers
@@ -224,7 +225,7 @@ def test_waves_without_which_all_is_far_off_need_no_calm_search(
     monkeypatch.setattr(explain, "in_a_swell", lambda *_: asked.append("swell"))
     monkeypatch.setattr(explain, "in_plain_waves", lambda *_: asked.append("plain") or among)
     monkeypatch.setattr(explain, "against", lambda found, *_: found)
-    monkeypatch.setattr(explain, "pushed_about", lambda *_: asked.append("pushed") or among)
+    monkeypatch.setattr(explain, "pushed_about", lambda *_, **__: asked.append("pushed") or among)
     search = cast("Search", None)
     assert _begun_with_all(search, second._replace(calm=None)) is None
     assert _begun_with_all(search, second._replace(calm=whole)) is among
@@ -248,7 +249,7 @@ def test_what_pays_beside_them_is_named(thrown: tuple[Fitter, Explanation]) -> N
     fitter, whole = thrown
     with Workers(fitter, 1) as workers:
         search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
-        told = pushed_about(search, with_sea(fitter, whole))
+        told = pushed_about(search, with_sea(fitter, whole), are_far_likelier=False)
         assert told is not None
         assert not told.left.is_nothing  # a sea would push all the time
         assert told.waves is None
@@ -282,7 +283,7 @@ def test_forces_that_leave_nothing_must_be_asked_for(
     with Workers(fitter, 1) as workers:
         search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
         monkeypatch.setattr(Search, "run_from", lambda *_, **__: sea)
-        assert pushed_about(search, sea) is not None
+        assert pushed_about(search, sea, are_far_likelier=False) is not None
         nothing = leftover(fitter, sea).__class__(
             is_coloured=False,
             is_local=False,
@@ -292,5 +293,9 @@ def test_forces_that_leave_nothing_must_be_asked_for(
             smooth_gain=0.0,
             is_smooth=False,
         )
-        monkeypatch.setattr(seas, "leftover", lambda *_: nothing)
-        assert pushed_about(search, sea) is None
+        monkeypatch.setattr(all_at_sea, "leftover", lambda *_: nothing)
+        assert pushed_about(search, sea, are_far_likelier=False) is None
+        monkeypatch.setattr(all_at_sea, "form_gains", lambda *_: {"unknown_wandering_force": 1.0})
+        assert pushed_about(search, sea, are_far_likelier=True) is not None
+        monkeypatch.setattr(all_at_sea, "form_gains", lambda *_: {"unknown_wandering_force": 100.0})
+        assert pushed_about(search, sea, are_far_likelier=True) is None
