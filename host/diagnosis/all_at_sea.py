@@ -1,6 +1,7 @@
 """Searches that begin with all that every vehicle has, among waves or forces that were told beside it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
@@ -50,8 +51,8 @@ def again_in_a_swell(
 def pushed_about(calm: Search, pushed: Explanation, are_far_likelier: bool) -> Explained | None:
     """What pays of all that every vehicle has under random forces; None if little does, or nothing is left.
 
-    Of forces that leave nothing it must be asked whether they are any, unless they are far likelier than none
-    and no form of unknown physics gains beside them.
+    Of forces that leave nothing it must be asked whether they are any, unless they are far likelier than
+    none; where a form of unknown physics gains beside these, they stand for physics in part.
     """
     fitter = calm.fitter
     calm.on_progress("random forces")
@@ -59,8 +60,8 @@ def pushed_about(calm: Search, pushed: Explanation, are_far_likelier: bool) -> E
     search = Search(fitter, calm.workers, calm.on_progress, base, root)
     found = search.run_from(pushed, is_all=True)
     left = leftover(fitter, found)
-    if not is_real(found.names):
+    if not is_real(found.names) or (left.is_nothing and not are_far_likelier):
         return None
-    if left.is_nothing and not (are_far_likelier and max(form_gains(fitter, found).values()) < margin(found)):
-        return None
+    if left.is_nothing and max(form_gains(fitter, found).values()) > margin(found):
+        left = replace(left, is_smooth=True)
     return Explained(found, search, left, None, is_of_all=True)

@@ -131,7 +131,8 @@ def test_where_nothing_else_acts_nothing_joins() -> None:
 
 
 # Of the shorter one the first end lies in a side valley.
-@pytest.mark.parametrize("rows", [900, pytest.param(1400, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("rows", [900, 1400])
 def test_a_long_hull_that_meets_the_water_differently_at_either_end(rows: int) -> None:
     fitter = Fitter([dive(LONG, drag=along_the_hull, rows=rows)])
     with Workers(fitter, 1) as workers:

@@ -296,6 +296,10 @@ def test_forces_that_leave_nothing_must_be_asked_for(
         monkeypatch.setattr(all_at_sea, "leftover", lambda *_: nothing)
         assert pushed_about(search, sea, are_far_likelier=False) is None
         monkeypatch.setattr(all_at_sea, "form_gains", lambda *_: {"unknown_wandering_force": 1.0})
-        assert pushed_about(search, sea, are_far_likelier=True) is not None
+        of_no_sea = pushed_about(search, sea, are_far_likelier=True)
+        assert of_no_sea is not None
+        assert of_no_sea.left.is_nothing
         monkeypatch.setattr(all_at_sea, "form_gains", lambda *_: {"unknown_wandering_force": 100.0})
-        assert pushed_about(search, sea, are_far_likelier=True) is None
+        in_part = pushed_about(search, sea, are_far_likelier=True)
+        assert in_part is not None
+        assert in_part.left.is_smooth
