@@ -64,8 +64,8 @@ def likelier_first(found: list[Way], on_progress: Callable[[str], None], jobs: i
     """The ways, the likelier first, as what tells more than the base equations do sees them.
 
     That is all that every vehicle has, where nothing is left beside it; else plain waves, where there are
-    any, with all that where it is likelier; else all that every vehicle has, where next to nothing is left,
-    or random forces account for that; else single effects.
+    any, with all that where it is likelier; else all that every vehicle has, where random forces account for
+    what is left, or next to nothing is; else single effects.
     """
     leading, *others = sorted(found, key=lambda way: way.fitter.root.bic)
     on_progress("what every vehicle has")
@@ -75,10 +75,12 @@ def likelier_first(found: list[Way], on_progress: Callable[[str], None], jobs: i
     if seen := _among_waves(found):
         on_progress("what every vehicle has, in the waves")
         return _in_a_swell(seen, whole)
-    if whole is not None and leads_on(leading.fitter, whole):
-        return _by_whole([leading, *others], leading.fitter.polished(whole))
-    pushed = None if whole is None else _pushed_about([leading, *others], whole, on_progress, jobs)
-    return pushed or by_single_effects(found, on_progress, jobs)
+    begun, leads = [leading, *others], whole is not None and leads_on(leading.fitter, whole)
+    if whole is not None and leads:
+        begun = _by_whole(begun, leading.fitter.polished(whole))
+        whole = begun[0].outset
+    pushed = [] if whole is None else _pushed_about(begun, whole, on_progress, jobs)
+    return pushed or (begun if leads else by_single_effects(found, on_progress, jobs))
 
 
 def _by_whole(found: list[Way], whole: Explanation) -> list[Way]:

@@ -144,8 +144,14 @@ def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(plane_choice, "_in_a_swell", lambda seen, _: seen)
     assert [each.outset for each in likelier_first([moved, held], lambda _: None, 1)] == [None, None]
     monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)
+    monkeypatch.setattr(plane_choice, "_pushed_about", lambda *_: [])
     assert order(moved, held) == [0, 1]
     assert likelier_first([held], lambda _: None, 1)[0].outset is whole
+    pushed: Any = SimpleNamespace(bic=-30.0)
+    monkeypatch.setattr(plane_choice, "_pushed_about", lambda ways, *_: [ways[0]._replace(pushed=pushed)])
+    (first,) = likelier_first([held], lambda _: None, 1)
+    assert first.pushed is pushed  # which is asked where something is left
+    assert first.outset is whole  # if it is not believed
     monkeypatch.setattr(plane_choice, "at_the_outset", lambda *_: None)
     monkeypatch.setattr(plane_choice, "by_single_effects", lambda found, *_: found[::-1])
     assert order(moved, held) == [1, 0]
