@@ -93,7 +93,10 @@ def again_astray(
     base, root = with_sea(fitter, fitter.base), with_sea(fitter, fitter.root)
     search = Search(fitter, workers, on_progress, base, root, part.search)
     best = search.run([again_under_forces(fitter, part.best)])
-    return Explained(best, search, leftover(fitter, best), None)
+    left = leftover(fitter, best)
+    if part.is_of_all:  # what it was doubted for was asked there
+        left = replace(left, is_smooth=left.is_smooth or part.left.is_smooth)
+    return Explained(best, search, left, None)
 
 
 def _in_seas(calm: Search, best: Explanation) -> list[Explanation]:

@@ -19,7 +19,7 @@ from host.diagnosis.plain_waves import plain_waves, whole_in_waves
 from host.diagnosis.plane_choice import Way, _in_a_swell
 from host.diagnosis.sea_fits import with_sea, with_waves
 from host.diagnosis.search import Search
-from host.diagnosis.seas import Explained, Waves
+from host.diagnosis.seas import Explained, Waves, again_astray
 from host.diagnosis.under_forces import CARRIED, climbed, likelihood
 from host.diagnosis.whole_vehicle import is_real
 from host.diagnosis.workers import Workers
@@ -294,6 +294,7 @@ def test_forces_that_leave_nothing_must_be_asked_for(
             is_smooth=False,
         )
         monkeypatch.setattr(all_at_sea, "leftover", lambda *_: nothing)
+        monkeypatch.setattr(seas, "leftover", lambda *_: nothing)
         assert pushed_about(search, sea, are_far_likelier=False) is None
         monkeypatch.setattr(all_at_sea, "form_gains", lambda *_: {"unknown_wandering_force": 1.0})
         of_no_sea = pushed_about(search, sea, are_far_likelier=True)
@@ -303,3 +304,7 @@ def test_forces_that_leave_nothing_must_be_asked_for(
         in_part = pushed_about(search, sea, are_far_likelier=True)
         assert in_part is not None
         assert in_part.left.is_smooth
+        monkeypatch.setattr(Search, "run", lambda *_: sea)
+        again = again_astray(fitter, workers, lambda _: None, in_part)
+        assert again.left.is_smooth  # on the whole of a long recording, too
+        assert not again_astray(fitter, workers, lambda _: None, of_no_sea).left.is_smooth
