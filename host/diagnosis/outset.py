@@ -21,7 +21,7 @@ from host.diagnosis.margins import LITTLE, MUCH, margin
 from host.diagnosis.pruning import pruned
 from host.diagnosis.sea_fits import as_filtered, with_sea
 from host.diagnosis.speed_forces import are_by_speed
-from host.diagnosis.starts import begun_beside, guess
+from host.diagnosis.starts import begun_from, guess
 from host.diagnosis.together import with_more
 from host.diagnosis.whole_vehicle import all_beside, ended, is_real
 from host.diagnosis.workers import Workers
@@ -118,13 +118,8 @@ def _starts(fitter: Fitter, names: Names) -> Iterator[Point]:
     Without a servo's lag, which alone takes a pole of the hull and leads elsewhere.
     """
     hull = fitter.root
-    yield (root := _beside(fitter, hull, names))
+    yield (root := begun_from(fitter, hull, names))
     for name in TURNING:
         hull = fitter.grown(hull, name, [])
-    yield _beside(fitter, hull, names)
+    yield begun_from(fitter, hull, names)
     yield guess(fitter, root, names)
-
-
-def _beside(fitter: Fitter, found: Explanation, names: Names) -> Point:
-    fit = found.fit
-    return begun_beside(fitter, Point(fit.structure, fit.parameters, fit.initial, fit.levels), names)

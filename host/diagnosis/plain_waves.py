@@ -4,8 +4,7 @@ from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import LINEAR, Fitter
 from host.diagnosis.margins import LITTLE, NAMING_MARGIN
 from host.diagnosis.sea_fits import as_filtered, roughly_with_waves, with_sea, with_waves
-from host.diagnosis.starts import begun_beside
-from host.gauss_newton import Point
+from host.diagnosis.starts import begun_from
 from host.waves import MOST_STEPS, is_sea
 
 MOSTLY = 0.7  # of what waves explain: of true ones a linear hull explains at most 0.4, of false ones 0.9
@@ -45,9 +44,7 @@ def whole_in_waves(fitter: Fitter, waves: Explanation, whole: Explanation) -> Ex
     waves  the root among waves, where all of it must pay
     whole  the same without waves, which must be far less likely
     """
-    fit, names = waves.fit, whole.names
-    start = begun_beside(fitter, Point(fit.structure, fit.parameters, fit.initial, fit.levels), names)
-    held = fitter.explained(names, fitter.carried_on(start))
+    held = fitter.explained(whole.names, fitter.carried_on(begun_from(fitter, waves, whole.names)))
     if held.bic > waves.bic - NAMING_MARGIN:
         return None
     found = with_waves(fitter, held)

@@ -92,6 +92,12 @@ def begun_beside(fitter: "Fitter", at: Point, names: Names) -> Point:
     return Point(structure_of(names), idle_values(fitter, names, known), at.initial, at.noise)
 
 
+def begun_from(fitter: "Fitter", found: Explanation, names: Names) -> Point:
+    """The same where a smaller set ended, under its noise."""
+    fit = found.fit
+    return begun_beside(fitter, Point(fit.structure, fit.parameters, fit.initial, fit.levels), names)
+
+
 def scanned(fitter: "Fitter", start: Point) -> Point:
     """The start with each of its moments where a free run is nearest to the recordings, all else held.
 

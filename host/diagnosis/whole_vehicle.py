@@ -17,7 +17,7 @@ from host.catalogue.nuisance import SPEED_CORRECTION
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.margins import LITTLE, MUCH, margin
 from host.diagnosis.pruning import pruned
-from host.diagnosis.starts import begun_beside, with_other_moments
+from host.diagnosis.starts import begun_beside, begun_from, with_other_moments
 from host.gauss_newton import Point
 from host.uncertainty import covariance_within
 from host.valleys import are_apart, has_usual_heave, look_alikes, with_usual_heave
@@ -76,12 +76,11 @@ def all_beside(fitter: "Fitter", leading: Explanation) -> Explanation:
     And where water moves, a measured speed that may not be through it. Begun where they hardly act yet; not
     carried to its end where much is left.
     """
-    fit, names = leading.fit, leading.names | {*ORDINARY, *FAINT, ALONG_THE_HULL}
+    names = leading.names | {*ORDINARY, *FAINT, ALONG_THE_HULL}
     if fitter.recordings[0].has_speed and names & {*named(OVER_GROUND).changes}:
         names |= {OVER_GROUND}
     names |= {*fitter.tools_beside(names)}
-    start = begun_beside(fitter, Point(fit.structure, fit.parameters, fit.initial, fit.levels), names)
-    found = ended(fitter, start, names)
+    found = ended(fitter, begun_from(fitter, leading, names), names)
     if fitter.excess(found.fit) < LITTLE:
         return found
     # Bent to do without the rest, it may have put a change at another moment.
