@@ -71,23 +71,23 @@ def likelier_first(found: list[Way], on_progress: Callable[[str], None], jobs: i
     on_progress("what every vehicle has")
     whole = at_the_outset(leading.fitter, jobs)
     if whole is not None and says_all(leading.fitter, whole):
-        return _by_whole([leading, *others], whole)
+        return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
     if seen := _among_waves(found):
         on_progress("what every vehicle has, in the waves")
         return _in_a_swell(seen, whole)
     begun, leads = [leading, *others], whole is not None and leads_on(leading.fitter, whole)
     if whole is not None and leads:
-        begun = _by_whole(begun, leading.fitter.polished(whole))
+        seen_by_all = _as_seen_by(begun, leading.fitter.polished(whole))
+        begun = [way._replace(outset=own) for way, own in seen_by_all]
         whole = begun[0].outset
     pushed = [] if whole is None else _pushed_about(begun, whole, on_progress, jobs)
     return pushed or (begun if leads else by_single_effects(found, on_progress, jobs))
 
 
-def _by_whole(found: list[Way], whole: Explanation) -> list[Way]:
-    """The ways as all that every vehicle has sees them, which was fitted to the first."""
-    there = (way.fitter.reduced(whole, whole.names) for way in found[1:])
-    begun = [way._replace(outset=one) for way, one in zip(found, [whole, *there], strict=True)]
-    return sorted(begun, key=lambda way: inf if way.outset is None else way.outset.bic)
+def _as_seen_by(found: list[Way], one: Explanation) -> list[tuple[Way, Explanation]]:
+    """The ways, the likelier first, as a set sees them that was fitted to the first; with each its own."""
+    sets = [one, *(way.fitter.reduced(one, one.names) for way in found[1:])]
+    return sorted(zip(found, sets, strict=True), key=lambda pair: pair[1].bic)
 
 
 def _among_waves(found: list[Way]) -> list[Way]:
@@ -109,28 +109,24 @@ def _in_a_swell(seen: list[Way], whole: Explanation | None) -> list[Way]:
     if lost > FAR_LIKELIER * whole.fit.samples and fitter.excess(waves.fit) < LITTLE:
         leading = leading._replace(calm=whole)
     swell = whole_in_waves(fitter, waves, whole)
+    begun = [leading, *others]
     if swell is None:
-        return [leading, *others]
-    begun = [leading._replace(swell=swell)]
-    begun += [way._replace(swell=way.fitter.reduced(swell, swell.names)) for way in others]
-    return sorted(begun, key=lambda way: inf if way.swell is None else way.swell.bic)
+        return begun
+    return [way._replace(swell=own) for way, own in _as_seen_by(begun, swell)]
 
 
 def _pushed_about(
     found: list[Way], whole: Explanation, on_progress: Callable[[str], None], jobs: int
 ) -> list[Way]:
     """The ways as all that every vehicle has under random forces sees them, where these explain the rest."""
-    leading, *others = found
-    fitter = leading.fitter
+    fitter = found[0].fitter
     with Workers(fitter, jobs) as workers:
         pushed = pushed_by_forces(Search(fitter, workers, on_progress, fitter.base, fitter.root), whole)
     if pushed is None:
         return []
     is_far = as_filtered(fitter, whole).bic > pushed.bic + FAR_LIKELIER * pushed.fit.samples
     calm = whole if is_far else None
-    begun = [leading._replace(pushed=pushed, calm=calm)]
-    begun += [way._replace(pushed=way.fitter.reduced(pushed, pushed.names), calm=calm) for way in others]
-    return sorted(begun, key=lambda way: inf if way.pushed is None else way.pushed.bic)
+    return [way._replace(pushed=own, calm=calm) for way, own in _as_seen_by(found, pushed)]
 
 
 def by_single_effects(found: list[Way], on_progress: Callable[[str], None], jobs: int) -> list[Way]:
@@ -168,6 +164,7 @@ def is_likelier(
     """
     fitter = Fitter(other.fitter.recordings, known=best)
     if in_own_waves is not None:
+        # Each takes waves of its own to estimate: of many too long.
         fewer = _leaner(in_own_waves) if len(in_own_waves.names) <= LARGEST_SET else []
         sets = [in_own_waves, *(fitter.reduced(in_own_waves, names) for names in fewer)]
         return min(with_waves(fitter, one).bic for one in sets) < in_own_waves.bic - margin(in_own_waves)
