@@ -7,6 +7,7 @@ else by NumPy, which takes several times longer and differs by rounding.
 
 import ctypes
 from collections.abc import Callable
+from copy import copy
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -102,6 +103,32 @@ class AllRows:
         self._program = np.array(program, dtype=np.intp).reshape(-1, 4)
         self._given = np.array(inputs, dtype=np.intp).reshape(-1, 3)
         self._results = np.array(outputs, dtype=np.intp).reshape(-1, 4)
+
+    def with_columns(self, result: int, columns: tuple[int, ...]) -> "AllRows":
+        """The same with these columns alone of one result; what nothing else needs is left undone."""
+        rows, count = self._shapes[result]
+        if columns == tuple(range(count)):
+            return self
+        other = copy(self)
+        other._shapes = [*self._shapes]
+        other._shapes[result] = rows, len(columns)
+        now_at = {column: place for place, column in enumerate(columns)}
+        kept = [
+            (which, row, now_at[column] if which == result else column, place)
+            for which, row, column, place in self._results.tolist()
+            if which != result or column in now_at
+        ]
+        needed = {place for *_, place in kept}
+        program: list[list[int]] = []
+        for step in reversed(self._program.tolist()):
+            _, one, another, place = step
+            if place in needed:
+                program.append(step)
+                needed.discard(place)
+                needed |= {one, another}
+        other._program = np.array(program[::-1], dtype=np.intp).reshape(-1, 4)
+        other._results = np.array(kept, dtype=np.intp).reshape(-1, 4)
+        return other
 
     def __call__(self, *arguments: Array) -> list[Array]:
         """The results, each (N, rows, columns)."""

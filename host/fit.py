@@ -80,18 +80,6 @@ class Fit:
         """The same fit, said to have been found beside what wanders so."""
         return replace(self, wander=relative * np.column_stack([self.noise[[0, 1, 1]], np.ones(3)]))
 
-    def within(self, smaller: Structure) -> "Fit":
-        """The same fit said to be of equations that lack what it held where it does not act."""
-        kept = np.array([self.structure.names.index(name) for name in smaller.names])
-        return replace(
-            self,
-            structure=smaller,
-            parameters=self.parameters[kept],
-            free=self.free[kept],
-            information=self.information[np.ix_(kept, kept)],
-            rivals=(),
-        )
-
     @property
     def noise_levels(self) -> int:
         """How many numbers describe the noise."""

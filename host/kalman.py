@@ -89,7 +89,8 @@ def kalman_pass(
     P = np.diag(spread if spread is not None else np.zeros(form.nx))
     carried = np.concatenate([start, P[lower]])
     per_step = np.vstack([inputs.drive, inputs.measured, inputs.present])
-    table = over_rows(_kalman, form, rows)(carried, per_step, np.concatenate([parameters, noise]))
+    levels = np.concatenate([inputs.widened(parameters), noise])
+    table = over_rows(_kalman, form, rows)(carried, per_step, levels)
     split = 5 + 2 * form.nx
     variance = table[2:5]
     variance[::2][inputs.present == 0.0] = 1.0

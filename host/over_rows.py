@@ -14,7 +14,7 @@ ROWS_AT_ONCE = 256
 KEPT = 64  # functions of each kind: a search meets hundreds of sets, and those of all would fill the memory
 # Instructions and rows after which a function is compiled: it has run for about as long as that takes. One
 # that was compiled before is at once.
-FEW_ROWS, FEW_INSTRUCTIONS = 4e4, 8e7
+FEW_ROWS, FEW_INSTRUCTIONS = 3e4, 1.3e7
 
 F = TypeVar("F")
 OverRows = Callable[[Array, Array, Array], Array]

@@ -6,7 +6,7 @@ resolution.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import casadi as ca
@@ -36,6 +36,8 @@ class Inputs:
     present   (2, N) 1 where measured, else 0
     steps     (2,) of the rounding of pitch and depth where it rules, else 0
     whitening  of pitch and of depth, where more than white noise is in them
+    shared     larger equations that are evaluated in place of the structure's own, if any; what these lack
+               acts nowhere where its parameters are 0, and moves no state of its own
     """
 
     structure: Structure
@@ -45,6 +47,34 @@ class Inputs:
     substeps: int
     steps: Array = field(default_factory=lambda: np.zeros(2))
     whitening: Whitenings = NOT_WHITENED
+    shared: Structure | None = None
+
+    def of(self, structure: Structure, shared: Structure | None = None) -> "Inputs":
+        """What drives other equations over the same recording, which look back as far."""
+        return replace(self, structure=structure, shared=shared)
+
+    @property
+    def evaluated(self) -> Structure:
+        """The equations whose functions are built."""
+        return self.structure if self.shared is None else self.shared
+
+    @property
+    def own(self) -> tuple[int, ...]:
+        """The places of the structure's parameters among those of `evaluated`."""
+        return _places(self.structure.names, self.evaluated.names)
+
+    def widened(self, parameters: Array) -> Array:
+        """The structure's parameters among those of `evaluated`."""
+        if self.shared is None:
+            return parameters
+        values = np.zeros(len(self.shared.names))
+        values[list(self.own)] = parameters
+        return values
+
+
+@lru_cache
+def _places(own: tuple[str, ...], among: tuple[str, ...]) -> tuple[int, ...]:
+    return tuple(map(among.index, own))
 
 
 def inputs_of(
@@ -121,11 +151,13 @@ class Form:
             after.append(x)
         return after
 
-    def substep(self, x: ca.SX, p: ca.SX, drive: ca.SX, k: int | ca.SX) -> ca.SX:
-        """The state after sub-step k of a row, counted from 0."""
+    def substep(
+        self, x: ca.SX, p: ca.SX, drive: ca.SX, k: int | ca.SX, slope: Callable[..., ca.SX] | None = None
+    ) -> ca.SX:
+        """The state after sub-step k of a row, counted from 0; `slope` may stand for `slope_of`."""
         h = drive[3] / self.substeps
         states = self.structure.states
-        slope = _slope(self)
+        slope = slope or slope_of(self)
         time = drive[4] + k * h
         at_start = self.structure.chain(x, p, drive, time)
         moved = self.structure.actuate(at_start, h)
@@ -161,7 +193,7 @@ def _behind(y: ca.SX, start: ca.SX, end: ca.SX, bend: ca.SX, lag: ca.SX, h: ca.S
 
 
 @lru_cache(KEPT)
-def _slope(form: Form) -> ca.Function:
+def slope_of(form: Form) -> ca.Function:
     """x' for a plane angle that is held; as a function of its own, as inlining it is quicker than tracing."""
     x, p, drive = form.symbols()
     time, plane = ca.SX.sym("time"), ca.SX.sym("plane")
@@ -196,13 +228,14 @@ def _free_run(form: Form) -> ca.Function:
 
 def form_of(inputs: Inputs) -> Form:
     """Of the functions that propagate this recording."""
-    return Form(inputs.structure, inputs.substeps, inputs.drive.shape[0])
+    return Form(inputs.evaluated, inputs.substeps, inputs.drive.shape[0])
 
 
 def start_of(form: Form, parameters: Array, initial: Array, inputs: Inputs) -> tuple[Array, Array]:
     """All states at the first row (nx,), and their derivatives by the parameters and the base states."""
-    x, slopes = _initial(form)(initial, parameters, inputs.drive[:, 0])
-    return np.asarray(x, dtype=float).ravel(), np.asarray(slopes, dtype=float)
+    x, slopes = _initial(form)(initial, inputs.widened(parameters), inputs.drive[:, 0])
+    columns = [*inputs.own, *range(form.np, form.np + NX0)]
+    return np.asarray(x, dtype=float).ravel(), np.asarray(slopes, dtype=float)[:, columns]
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,6 +256,6 @@ def free_run(parameters: Array, initial: Array, inputs: Inputs) -> Run:
     """Simulates from the base states [w, q, theta, zeta] (4,) at the first row, blind to the measurements."""
     form = form_of(inputs)
     start, _ = start_of(form, parameters, initial, inputs)
-    table = over_rows(_free_run, form, inputs.drive.shape[1])(start, inputs.drive, parameters)
+    table = over_rows(_free_run, form, inputs.drive.shape[1])(start, inputs.drive, inputs.widened(parameters))
     within = table[:-2].reshape((form.substeps, form.nx, -1))
     return Run(states=within[0], outputs=table[-2:], within=within)

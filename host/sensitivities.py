@@ -18,6 +18,9 @@ from host.linear_recursion import linear_recursion
 from host.over_rows import KEPT, over_rows
 from host.propagate import Form, Inputs, Run, form_of, free_run, start_of
 from host.recording import Array
+from host.substep_slopes import substep_slopes
+
+SETS_KEPT = 256  # of those that share equations
 
 
 def innovations(
@@ -44,15 +47,15 @@ def sensitivities(
     form, rows = form_of(inputs), inputs.drive.shape[1]
     _, start = start_of(form, parameters, initial, inputs)
     with np.errstate(all="ignore"):  # a run that leaves the numbers is seen by its size
-        hx, hp = _output_slopes(form)(run.states, parameters, inputs.drive)
-        Fx, Fp = _slopes_of_substeps(form, run, parameters, inputs.drive)
+        hx, hp = _output_slopes(form, inputs.own)(run.states, inputs.widened(parameters), inputs.drive)
+        Fx, Fp = _slopes_of_substeps(form, run, parameters, inputs)
         if gains is not None:  # a measurement corrects the state before the first sub-step
             first = slice(0, None, form.substeps)
             FK = Fx[first] @ gains.T.reshape((rows, 2, form.nx)).transpose(0, 2, 1)
             Fx[first] -= FK @ hx
             Fp[first] -= FK @ hp
         seen = hx @ linear_recursion(Fx, Fp, start)[:: form.substeps]
-        seen[:, :, : form.np] += hp
+        seen[:, :, : parameters.size] += hp
         return seen.transpose(1, 2, 0) * inputs.present[:, None, :]
 
 
@@ -61,17 +64,20 @@ def steered_run(parameters: Array, initial: Array, inputs: Inputs, gains: Array)
     form = form_of(inputs)
     start, _ = start_of(form, parameters, initial, inputs)
     per_step = np.vstack([inputs.drive, inputs.measured, gains])
-    table = over_rows(_steered_step, form, inputs.drive.shape[1])(start, per_step, parameters)
+    steered = over_rows(_steered_step, form, inputs.drive.shape[1])
+    table = steered(start, per_step, inputs.widened(parameters))
     states, outputs, within = np.split(table, [form.nx, form.nx + 2])
     return Run(states=states, outputs=outputs, within=within.reshape((form.substeps, form.nx, -1)))
 
 
-def _slopes_of_substeps(form: Form, run: Run, parameters: Array, drive: Array) -> tuple[Array, Array]:
+def _slopes_of_substeps(form: Form, run: Run, parameters: Array, inputs: Inputs) -> tuple[Array, Array]:
     """F_x (N substeps, nx, nx) and F_p (N substeps, nx, parameters) of each sub-step of each row."""
-    rows, substeps = drive.shape[1], form.substeps
+    drive, substeps = inputs.drive, form.substeps
+    rows = drive.shape[1]
     states = run.within.transpose(1, 2, 0).reshape((form.nx, -1))
     number = np.tile(np.arange(float(substeps)), rows)[None]
-    Fx, Fp = _substep_slopes(form)(states, parameters, np.repeat(drive, substeps, axis=1), number)
+    values, driven = inputs.widened(parameters), np.repeat(drive, substeps, axis=1)
+    Fx, Fp = _substep_slopes(form, inputs.own)(states, values, driven, number)
     return Fx, Fp
 
 
@@ -87,18 +93,27 @@ def _steered_step(form: Form) -> ca.Function:
     return ca.Function("steered_run", [x, per_step, p], [after, result])
 
 
+@lru_cache(SETS_KEPT)
+def _substep_slopes(form: Form, own: tuple[int, ...]) -> AllRows:
+    """F_x (nx, nx) and F_p (nx, parameters) of one sub-step, by the parameters at these places."""
+    return _all_substep_slopes(form).with_columns(1, own)
+
+
 @lru_cache(KEPT)
-def _substep_slopes(form: Form) -> AllRows:
-    """F_x (nx, nx) and F_p (nx, parameters) of one sub-step."""
+def _all_substep_slopes(form: Form) -> AllRows:
     (x, p, drive), number = form.symbols(), ca.SX.sym("number")
-    after = form.substep(x, p, drive, number)
-    slopes = [ca.jacobian(after, x), ca.jacobian(after, p)]
+    slopes = substep_slopes(form, x, p, drive, number)
     return AllRows(ca.Function("substep", [x, p, drive, number], slopes))
 
 
+@lru_cache(SETS_KEPT)
+def _output_slopes(form: Form, own: tuple[int, ...]) -> AllRows:
+    """h_x (2, nx) and h_p (2, parameters), by the parameters at these places."""
+    return _all_output_slopes(form).with_columns(1, own)
+
+
 @lru_cache(KEPT)
-def _output_slopes(form: Form) -> AllRows:
-    """h_x (2, nx) and h_p (2, parameters)."""
+def _all_output_slopes(form: Form) -> AllRows:
     x, p, drive = form.symbols()
     y = form.outputs(x, p, drive)
     return AllRows(ca.Function("output", [x, p, drive], [ca.jacobian(y, x), ca.jacobian(y, p)]))

@@ -218,7 +218,8 @@ def whitened_in_waves(
 def _among(point: Point, inputs: list[Inputs]) -> tuple[InWaves, Point]:
     """The noise model, and the point with the states and the shape of the waves beside the vehicle's own."""
     structure = Structure((*point.structure.effects, *WAVES))
-    model = InWaves([replace(one, structure=structure) for one in inputs])
+    shared = [None if one.shared is None else Structure((*one.shared.effects, *WAVES)) for one in inputs]
+    model = InWaves([one.of(structure, wider) for one, wider in zip(inputs, shared, strict=True)])
     shape = np.zeros(len(SHAPE))
     shape[AT_DEPTH] = np.mean([np.mean(one.measured[1][one.present[1] > 0.0]) for one in inputs])
     levels = np.clip(point.noise, model.least, model.most)

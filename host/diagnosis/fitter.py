@@ -13,6 +13,7 @@ from host.diagnosis.absence import one_step_without
 from host.diagnosis.charges import charged_bic
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.first_guess import accelerations
+from host.diagnosis.shared_equations import in_shared_equations
 from host.diagnosis.spans import ALARM_LATE
 from host.diagnosis.starts import guess, idle, is_far, scanned, starts_again, starts_of
 from host.diagnosis.trims import HELD, trimmed
@@ -268,7 +269,8 @@ class Fitter:
                 inputs_of(recording, structure, self._longest_substep, steps, whitening)
                 for recording, whitening in rows
             ]
-        return [replace(one, structure=structure) for one in self._inputs[kind]]
+        shared = in_shared_equations(names)
+        return [one.of(structure, shared) for one in self._inputs[kind]]
 
     def explained(self, names: Names, fit: Fit) -> Explanation:
         """The fit of a set, with what the set is charged."""

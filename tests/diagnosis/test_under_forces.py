@@ -1,4 +1,4 @@
-"""Sets of many in equations that were compiled before; and what is told by random forces or waves at once."""
+"""Fits under random forces and waves, and what is told by these at once."""
 
 from typing import Any, cast
 
@@ -8,7 +8,7 @@ from hidden_dive import hidden_dive
 from test_seas import in_waves
 
 from host.catalogue import FAINT, ORDINARY
-from host.diagnosis import all_at_sea, explain, outset, plane_choice, seas, under_forces
+from host.diagnosis import all_at_sea, explain, outset, plane_choice, seas
 from host.diagnosis.all_at_sea import in_a_swell, pushed_about
 from host.diagnosis.explain import _begun_with_all
 from host.diagnosis.explanation import Explanation
@@ -20,13 +20,11 @@ from host.diagnosis.plane_choice import Way, _in_a_swell
 from host.diagnosis.sea_fits import with_sea, with_waves
 from host.diagnosis.search import Search
 from host.diagnosis.seas import Explained, Waves, again_astray
-from host.diagnosis.under_forces import CARRIED, climbed, likelihood
+from host.diagnosis.under_forces import climbed
 from host.diagnosis.whole_vehicle import is_real
 from host.diagnosis.workers import Workers
-from host.filter_error import filter_error_from
 from host.gauss_newton import Point
 from host.recording import Array
-from host.waves import in_waves_from
 
 SEVERAL = (
     "heave_pitch_rate_coupling",
@@ -72,39 +70,6 @@ def several(fitter: Fitter, begun: Explanation) -> Explanation:
     for name in SEVERAL:
         begun = fitter.grown(begun, name, [])
     return begun
-
-
-@pytest.mark.parametrize("kind", ["white forces", "waves"])
-def test_wider_equations_change_nothing(kind: str, rough: tuple[Fitter, Explanation]) -> None:
-    fitter, waves = rough
-    found = several(fitter, waves if kind == "waves" else with_sea(fitter, fitter.root))
-    fit = found.fit
-    own = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
-    inputs, free = fitter.inputs(found.names, for_filter=True), fitter.free(found.names)
-    climb = in_waves_from if kind == "waves" else filter_error_from
-    alone = climb(own, inputs, free, 3, holds_noise=True)
-    assert len(CARRIED - found.names) > 2
-    wide, wide_inputs = under_forces._carried(fitter, own)
-    assert wide.structure != own.structure
-    held = np.isin(wide.structure.names, own.structure.names) & fitter.free(
-        frozenset(effect.name for effect in wide.structure.effects)
-    )
-    carried = climb(wide, wide_inputs, held, 3, holds_noise=True).within(own.structure)
-    assert carried.structure == alone.structure
-    assert carried.log_likelihood == pytest.approx(alone.log_likelihood, abs=1e-6)
-    np.testing.assert_allclose(carried.parameters, alone.parameters, rtol=1e-6, atol=1e-9)
-    scale = np.abs(alone.information).max()
-    np.testing.assert_allclose(carried.information, alone.information, atol=1e-6 * scale)
-    for one, other in zip(carried.scores, alone.scores, strict=True):
-        np.testing.assert_allclose(one, other, atol=1e-6 * np.abs(other).max())
-    assert likelihood(fitter, own) == pytest.approx(found.fit.log_likelihood, abs=1e-6)
-
-
-def test_few_effects_keep_their_own_equations(thrown: tuple[Fitter, Explanation]) -> None:
-    fitter, _ = thrown
-    fit = with_sea(fitter, fitter.root).fit
-    point = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
-    assert under_forces._carried(fitter, point)[0].structure == fit.structure
 
 
 def test_a_fit_that_would_not_get_there_is_given_up(thrown: tuple[Fitter, Explanation]) -> None:
