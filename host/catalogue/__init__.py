@@ -41,9 +41,9 @@ _TOOLS = (
     nuisance.PLANE_BEFORE,
     nuisance.SPEED_CORRECTION,
     unknown.ANY_SMOOTH_FORCE,
-    *moments.SCANS.values(),
 )
-_ALL = BY_NAME | UNKNOWN | {effect.name: effect for effect in _TOOLS}
+_ENTRIES = (effect for name, entry in BY_NAME.items() for effect in (entry, moments.SCANS.get(name)))
+_ALL = {effect.name: effect for effect in (*filter(None, _ENTRIES), *UNKNOWN.values(), *_TOOLS)}
 ORDINARY = (
     "heave_pitch_rate_coupling",
     "large_angle_kinematics",

@@ -13,6 +13,8 @@ from host.catalogue.switching import after
 from host.equations import Chain, Effect, Parameter, Slot, Term
 
 Action = Callable[[Chain, ca.SX], None]
+SETTLING = "speed_settling"
+SHORTEST = 0.05  # s, in which any speed changes: a vehicle has mass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,6 +71,11 @@ def with_size(action: Action | None, size: Callable[[Chain], ca.SX]) -> Term | N
 
 def _speed(c: Chain, size: ca.SX) -> None:
     unmeasured = size * (1 - c.is_speed_known)
+    if SETTLING in c.p:  # else it is asked when it happened
+        lag = c.p[SETTLING] + SHORTEST
+        missing = ca.exp(-ca.fmax(c.time - c.p["speed_change_time"], 0) / lag)
+        c.surge = c.surge + c.p["u0"] * unmeasured * missing / lag
+        unmeasured = unmeasured * (1 - missing)
     c.speed = c.speed + c.p["u0"] * unmeasured
     c.speed_ratio = c.speed_ratio + unmeasured
 
@@ -97,7 +104,9 @@ KINDS = (
         force=_speed,
         size=Parameter(name="speed_step", unit="1", lower=-0.9, upper=5, meaning="share lost or gained"),
         sentence="The forward speed changed at one moment: thrust was lost, or something drags.",
-        equation="u0 -> u0 (1 + speed_step)",
+        equation="u0 -> u0 (1 + speed_step (1 - exp(-(t - speed_change_time) / speed_settling)))",
+        details=(Parameter(name=SETTLING, unit="s", lower=0, upper=300, meaning="how slowly it changes"),),
+        likely=((0.0,), (2.0,)),
     ),
     Change(
         name="trim_moment_change",

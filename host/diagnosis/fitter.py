@@ -79,7 +79,7 @@ class Fitter:
         if recordings[0].has_speed:
             self.held["u0"] = mean_speed(recordings)
             # Where the speed is measured its change is data, and there is nothing in it to estimate.
-            self.held |= {"speed_step": 0.0, "speed_change_time": 0.0}
+            self.held |= {"speed_step": 0.0, "speed_change_time": 0.0, "speed_settling": 0.0}
         else:
             self.held["ground_share"] = 0.0
         self.held |= dict.fromkeys(SPANS.values(), max(float(r.time[-1]) for r in recordings))

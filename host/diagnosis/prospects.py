@@ -158,8 +158,11 @@ def _probes(
             np.array([*probes[0][:-1], period]) for period in _periods(fitter, effect.periods, parent.fit)
         ]
     if effect.name in SCANS:
+        when = effect.scales.index("duration")
         probes = [
-            np.array([*probes[0][:-1], moment]) for moment in _moments(fitter, effect.name, parent, steering)
+            np.array([*probe[:when], moment, *probe[when + 1 :]])
+            for moment in _moments(fitter, effect.name, parent, steering)
+            for probe in probes
         ]
     if effect.force is not None and len(effect.size_names) == len(effect.parameters):
         # Linear in its sizes, a force is foretold best from none; far off, readings in steps mislead.

@@ -1,18 +1,20 @@
 """What changed at one moment, known roughly or not: the part around it, the name and size of the change."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from hidden_dive import BASE, hidden_dive
 
-from host.catalogue import CATALOGUE, CHANGES, structure_of
-from host.catalogue.moments import LAST
+from host.catalogue import BY_NAME, CATALOGUE, CHANGES, structure_of
+from host.catalogue.moments import COUNT, LAST, SCANS, sizes
 from host.diagnosis.around import around, around_alarm
 from host.diagnosis.candidates import eligible
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.exchange import exchanged
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.prospects import _moments, probed
 from host.diagnosis.search import Search
 from host.diagnosis.spans import divide
 from host.diagnosis.whole_vehicle import all_beside
@@ -169,6 +171,57 @@ def test_a_change_of_no_size_leaves_the_speed_that_is_lost_as_it_is(change: str)
         parameters = np.array([known.get(name, 0.0) for name in structure.names])
         runs.append(free_run(parameters, np.array([0.0, 0.0, 0.0, 20.0]), inputs_of(dive, structure)).outputs)
     np.testing.assert_array_equal(*runs)
+
+
+@pytest.mark.parametrize("name", [*SCANS])
+def test_a_change_at_a_tried_moment_is_that_change(name: str) -> None:
+    dive = hidden_dive(duration=30.0)
+    beside = ("speed_loss", "munk_moment", "heave_quadratic_drag", "rudder_stall", "rudder_offset")
+    known = {**BASE, "speed_time": 5.0, "c_ud": 2.0, "c_uq": 1.0, "c_qw": 0.4, "c_ww": -1.0}
+    known |= {"rudder_zero": 0.02, "stall_angle": 0.15, "stall_width": 0.1, "stall_share": 0.5, LAST: 30.0}
+    entry = BY_NAME[name]
+    size, when = entry.parameters[:2]
+    tried = {sizes(name)[7]: 0.01}
+    alone = {size.name: 0.01, when.name: 30.0 * 8 / (COUNT + 1)}
+
+    def run(effects: tuple[str, ...], values: dict[str, float]) -> Array:
+        structure = structure_of(effects)
+        parameters = np.array([(known | values).get(p, 0.0) for p in structure.names])
+        return free_run(parameters, np.array([0.0, 0.0, 0.0, 20.0]), inputs_of(dive, structure)).outputs
+
+    nothing = run(beside, {})
+    one, other = run((*beside, SCANS[name].name), tried), run((*beside, name), alone)
+    assert np.abs(one - nothing).max() > 1e-4
+    # A speed takes a moment to change.
+    np.testing.assert_allclose(one - nothing, other - nothing, atol=0.05 * np.abs(one - nothing).max())
+
+
+def test_a_low_centre_of_gravity_feels_how_quickly_the_speed_changes() -> None:
+    dive = hidden_dive(duration=40.0)
+    dive = replace(dive, rudder=np.zeros(dive.time.size))
+    structure = structure_of(("speed_change", "surge_pitch_coupling"))
+    runs = []
+    for settling in (0.0, 2.0, 1e3):
+        known = {**BASE, "speed_step": -0.2, "speed_change_time": 10.0, "speed_settling": settling}
+        known |= {"pendulum_share": 1.0}
+        parameters = np.array([known.get(name, 0.0) for name in structure.names])
+        pitch, _ = free_run(parameters, np.array([0.0, 0.0, 0.0, 20.0]), inputs_of(dive, structure)).outputs
+        runs.append(pitch)
+        assert np.abs(pitch[dive.time < 9.5]).max() < 1e-6
+    at_once, soon, hardly = (float(np.abs(pitch).max()) for pitch in runs)
+    assert at_once > soon > 10.0 * hardly > 0.0
+
+
+@pytest.mark.parametrize(("name", "change"), [("current_change", water), ("trim_moment_change", trim)])
+def test_the_likeliest_moments_are_tried_with_all_that_else_is_likely(
+    name: str, change: Callable[[float, Array, float], tuple[float, float, float]]
+) -> None:
+    fitter = Fitter([hidden_dive(change, seed=4, duration=60.0)])
+    starts = [tuple(start[1:]) for _, start in probed(fitter, fitter.root, BY_NAME[name], [])]
+    moments = _moments(fitter, name, fitter.root, None)
+    expected = [(moment, *probe[2:]) for moment in moments for probe in BY_NAME[name].probes]
+    assert len({moment for moment, *_ in expected}) >= 2
+    np.testing.assert_allclose(starts[: len(expected)], expected)
 
 
 @pytest.mark.parametrize(
