@@ -54,7 +54,7 @@ def among_drift(calm: Search, best: Explanation) -> Explained | None:
     """The search beside what drifts, where that explains more than the best so far, random forces or none."""
     calm.on_progress("sensors that wander, gusts")
     fitter = calm.fitter
-    known = best.names - UNKNOWN.keys()
+    known = best.names.difference(UNKNOWN)
     first = drifting(fitter, best if known == best.names else fitter.reduced(best, known))
     if first is None or first.bic > as_filtered(fitter, best).bic - NAMING_MARGIN:
         return None

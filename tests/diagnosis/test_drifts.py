@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from hidden_dive import Extra, hidden_dive, nothing
 
+from host.catalogue import UNKNOWN
 from host.diagnosis import drifts
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.drift_fits import beside, drifting
-from host.diagnosis.drifts import again_in_drift, in_drift
+from host.diagnosis.drifts import again_in_drift, among_drift, in_drift
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.files import write_extended_model
 from host.diagnosis.fitter import Fitter
@@ -130,3 +131,21 @@ def test_what_drifts_on_a_part_is_looked_for_on_the_whole(gusty: tuple[Fitter, E
     assert told.left.is_nothing
     assert not told.best.names
     assert np.sqrt(told.best.fit.wander[2, 0]) == pytest.approx(0.05, rel=0.4)
+
+
+def test_no_form_of_unknown_physics_is_carried_into_what_drifts(
+    gusty: tuple[Fitter, Explanation], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitter, drifted = gusty
+    form = next(iter(UNKNOWN))
+    names = frozenset({"actuator_lag", form})
+    begun: list[Explanation] = []
+    monkeypatch.setattr(drifts, "drifting", lambda _, one: begun.append(one) or drifted)
+    with Workers(fitter, 1) as workers:
+        calm = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        point = fitter.point(frozenset({"actuator_lag"}), fitter.base, "actuator_lag", np.array([0.1]))
+        best = fitter.explained(names, fitter.grown(fitter.root, form, []).fit)
+        monkeypatch.setattr(fitter, "point", lambda *_: point)
+        assert among_drift(calm, Explanation(best.names, best.fit, -1e9)) is None  # as nothing is likelier
+    assert begun[0].names == {"actuator_lag"}
+    assert hash(begun[0].names) == hash(frozenset({"actuator_lag"}))  # by which a search remembers it
