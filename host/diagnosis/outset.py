@@ -3,7 +3,7 @@
 The base equations bend so far to what a real vehicle has beside them that of its effects none alone says
 much, and the search that begins with each takes longest. All at once take no longer than two of them: where
 they leave nothing, it only has to be found which of them pay; where next to nothing, what acts beside them.
-What they hardly touch is no hull's: then something may have changed under way.
+What they hardly touch is no hull's: then something may have changed under way, or keeps the plane back.
 """
 
 from collections.abc import Iterator
@@ -13,16 +13,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.catalogue import ALONG_THE_HULL, FAINT, ORDINARY
+from host.catalogue.kin import OFFSETS
 from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation, Names
-from host.diagnosis.fitter import Fitter
+from host.diagnosis.fitter import ROUGHLY, Fitter
 from host.diagnosis.margins import LITTLE, MUCH, margin
 from host.diagnosis.pruning import pruned
 from host.diagnosis.sea_fits import as_filtered, with_sea
 from host.diagnosis.speed_forces import are_by_speed
 from host.diagnosis.starts import begun_from, guess
 from host.diagnosis.together import with_more
+from host.diagnosis.trims import retrimmed
 from host.diagnosis.whole_vehicle import all_beside, ended, is_real
 from host.diagnosis.workers import Workers
 from host.gauss_newton import Point
@@ -36,13 +38,21 @@ MOST_FORCES = 0.1  # of the variance of all force: what acts is known but for a 
 FAR_LIKELIER = 0.1  # of BIC a sample, under random forces
 FAIR_PART = 0.02  # of what these explain, that what is missing should gain even beside them
 TURNING = ("munk_moment", "heave_pitch_rate_coupling")
-LEADING = 3  # changes, beside which all the rest is tried
+LEADING = 3  # of them, beside which all the rest is tried
+DRIVE = (
+    "actuator_backlash",
+    "actuator_rate_limit",
+    "actuator_saturation",
+    "actuator_delay",
+    "rudder_stall",
+)
+"""What may keep a plane from where it is commanded to: then no hull follows the commands."""
 
 
 def at_the_outset(fitter: Fitter, jobs: int = 1) -> Explanation | None:
     """The root with all that every vehicle has, where that leaves much; None where it does not.
 
-    Where they lead nowhere, beside a change at one moment, if that leaves less.
+    Where they lead nowhere, beside what changes at one moment or keeps the plane, if that leaves less.
     """
     if fitter.excess(fitter.root.fit) < MUCH:
         return None
@@ -55,8 +65,23 @@ def at_the_outset(fitter: Fitter, jobs: int = 1) -> Explanation | None:
             return found
         best = min(best, found, key=lambda e: e.bic)
         if fitter.excess(best.fit) > LOST:
-            return min(best, _beside_a_change(fitter, jobs), key=lambda e: e.bic)
-    return best
+            return min(best, _beside_what_leads(fitter, jobs), key=lambda e: e.bic)
+    return min(best, _by_fewer(fitter, best, jobs), key=lambda e: e.bic)
+
+
+def _by_fewer(fitter: Fitter, whole: Explanation, jobs: int) -> Explanation:
+    """The same from where all but the faint ends, which leads some fits elsewhere, with the likeliest offset.
+
+    That of the plane grows with the square of the speed, and a free trim, which does its work, does not.
+    """
+    few = whole.names - {*FAINT, ALONG_THE_HULL}
+    lean = ended(fitter, begun_from(fitter, fitter.root, few), few)
+    with Workers(fitter, jobs) as workers:
+        others = workers.results([(retrimmed, (lean, frozenset({name}))) for name in OFFSETS])
+    best: Explanation = min([lean, *others], key=lambda e: e.bic)
+    names = best.names | whole.names - {FREE_TRIM.name}
+    all_of_it = ended(fitter, begun_from(fitter, best, names), names)
+    return all_of_it if all_of_it.fit.log_likelihood > best.fit.log_likelihood - ROUGHLY else best
 
 
 def says_all(fitter: Fitter, whole: Explanation) -> bool:
@@ -70,10 +95,10 @@ def leads_on(fitter: Fitter, whole: Explanation) -> bool:
     return fitter.excess(whole.fit) < most
 
 
-def _beside_a_change(fitter: Fitter, jobs: int) -> Explanation:
-    """The likeliest change at one moment with all that every vehicle has."""
+def _beside_what_leads(fitter: Fitter, jobs: int) -> Explanation:
+    """All that every vehicle has with the likeliest change at one moment, or fault of the plane's drive."""
     with Workers(fitter, jobs) as workers:
-        alone = workers.results([(Fitter.grown, (fitter.root, name, [])) for name in SCANS])
+        alone = workers.results([(Fitter.grown, (fitter.root, name, [])) for name in (*SCANS, *DRIVE)])
         leading = sorted(alone, key=lambda e: e.bic)[:LEADING]
         found: list[Explanation] = workers.results([(all_beside, (one,)) for one in leading])
     return min(found, key=lambda e: e.bic)

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from hidden_dive import hidden_dive
 
-from host.catalogue import ALONG_THE_HULL, ORDINARY
+from host.catalogue import ALONG_THE_HULL, FAINT, ORDINARY
+from host.catalogue.kin import OFFSETS
+from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis import outset, plane_choice
 from host.diagnosis import search as module
 from host.diagnosis.diagnose import diagnose
@@ -18,9 +20,14 @@ from host.diagnosis.margins import LITTLE, MUCH
 from host.diagnosis.outset import FAR_LESS, LOST, at_the_outset, leads_on
 from host.diagnosis.plane_choice import Way, likelier_first
 from host.diagnosis.search import Search
+from host.diagnosis.trims import retrimmed
+from host.diagnosis.whole_vehicle import ended
 from host.read_recordings import read_recordings
 from host.recording import Array
 from host.vehicle import default_vehicle
+from tools.sitl.recording import write_csv
+from tools.trial.deck import Card
+from tools.trial.draw import draw
 
 SIMULATED = Path(__file__).parent.parent / "data" / "simulators" / "pvs_remus100__3211.csv"
 FEW = frozenset({"actuator_lag", "free_trim"})
@@ -58,8 +65,66 @@ def test_where_something_else_acts_as_well_it_leaves_far_less(
     found = at_the_outset(real)
     assert told is not None
     assert found is not None
-    assert found.names | {ALONG_THE_HULL} == told.names | {ALONG_THE_HULL}
+    trims = {ALONG_THE_HULL, FREE_TRIM.name, *OFFSETS}
+    assert found.names - trims == told.names - trims
     assert real.excess(found.fit) < FAR_LESS * real.excess(real.root.fit)
+
+
+@pytest.mark.parametrize("is_likelier", [True, False])
+def test_an_offset_takes_the_place_of_the_free_trim_where_that_cannot_do_its_work(
+    is_likelier: bool, real: Fitter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = at_the_outset(real)
+    assert whole is not None
+
+    def with_offset(fitter: Fitter, one: Explanation, offsets: frozenset[str]) -> Explanation:
+        found = retrimmed(fitter, one, offsets)
+        gain = 1e6 if is_likelier and offsets == {"rudder_offset"} else -1e6
+        return Explanation(found.names, found.fit, found.bic - gain)
+
+    monkeypatch.setattr(outset, "retrimmed", with_offset)
+    found = outset._by_fewer(real, whole, 1)
+    assert ("rudder_offset" in found.names) == is_likelier
+    assert (FREE_TRIM.name in found.names) != is_likelier
+    assert found.names >= whole.names - {FREE_TRIM.name}
+    lost = lambda _, __, names: Explanation(names, real.root.fit, 0.0)  # noqa: E731
+    poor = lambda fitter, at, names: (lost if {*FAINT} & names else ended)(fitter, at, names)  # noqa: E731
+    monkeypatch.setattr(outset, "ended", poor)
+    assert outset._by_fewer(real, whole, 1).names.isdisjoint(FAINT)  # what ended below its part is of no use
+
+
+def test_what_keeps_the_plane_back_is_tried_beside_all_as_changes_are(
+    real: Fitter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    likeliest = {"ballast_change": -30.0, "actuator_backlash": -40.0, "rudder_stall": -20.0}
+
+    def grown(_: Fitter, parent: Explanation, name: str, __: list[Array]) -> Explanation:
+        return Explanation(frozenset({name}), parent.fit, likeliest.get(name, 0.0))
+
+    beside: list[Explanation] = []
+    monkeypatch.setattr(Fitter, "grown", grown)
+    monkeypatch.setattr(outset, "all_beside", lambda _, one: beside.append(one) or one)
+    found = outset._beside_what_leads(real, 1)
+    assert [one.bic for one in beside] == [-40.0, -30.0, -20.0]
+    assert found.names == {"actuator_backlash"}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("number", "hidden"),
+    [(1, ("rudder_offset",)), (3, ("surface_waves", "actuator_backlash"))],
+    ids=["a bent plane", "play of a plane, in waves"],
+)
+def test_what_acts_on_a_drawn_vehicle_is_found_beside_all_that_it_has(
+    number: int, hidden: tuple[str, ...], tmp_path: Path
+) -> None:
+    card = Card("one" if len(hidden) == 1 else "two", hidden)
+    write_csv(tmp_path / "dive.csv", draw(77201, number, card, "usual").table)
+    fitter = Fitter(read_recordings(tmp_path / "dive.csv", default_vehicle()))
+    found = at_the_outset(fitter)
+    assert found is not None
+    assert hidden[-1] in found.names
+    assert leads_on(fitter, found)
 
 
 def test_a_textbook_vehicle_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,7 +142,7 @@ def test_where_it_leads_nowhere_something_may_have_changed(monkeypatch: pytest.M
     assert "ballast_change" in found.names
     assert found.leaves_white
     assert leads_on(fitter, found)
-    monkeypatch.setattr(outset, "_beside_a_change", lambda fitter, _: fitter.root)
+    monkeypatch.setattr(outset, "_beside_what_leads", lambda fitter, _: fitter.root)
     nowhere = at_the_outset(fitter)
     assert nowhere is not None
     assert not leads_on(fitter, nowhere)
