@@ -121,6 +121,7 @@ def test_what_a_free_run_cannot_find_is_found_while_the_measurements_steer() -> 
     assert values["c_qq"] == pytest.approx(-23.0, rel=0.1)
 
 
+@pytest.mark.long
 def test_where_nothing_else_acts_nothing_joins() -> None:
     fitter = Fitter([dive(SHORT)])
     with Workers(fitter, 1) as workers:

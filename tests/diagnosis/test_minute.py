@@ -42,7 +42,10 @@ def test_an_offset_is_measured_by_the_angle_that_holds_it(name: str, largest: fl
     assert minute_in(with_offset(1.01 * largest)) == frozenset()
 
 
-@pytest.mark.parametrize(("moment", "verdict"), [(1.2e-4, "no_mismatch"), (1.2e-2, "explained")])
+@pytest.mark.parametrize(
+    ("moment", "verdict"),
+    [(1.2e-4, "no_mismatch"), pytest.param(1.2e-2, "explained", marks=pytest.mark.long)],
+)
 def test_a_minute_moment_is_modelled_and_not_named(moment: float, verdict: Verdict) -> None:
     recording = hidden_dive(lambda *_: (0.0, moment, 0.0), duration=120.0, noise=0.02)
     found = diagnose([replace(recording, speed=np.full(recording.time.size, BASE["u0"]))])

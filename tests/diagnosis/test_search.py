@@ -200,6 +200,7 @@ def test_a_set_that_ended_below_its_part_was_never_fitted_beside_it() -> None:
         assert bool(said) == is_tried_again
 
 
+@pytest.mark.long
 def test_an_offset_joins_a_speed_that_changes_and_what_it_leaves_is_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
