@@ -6,7 +6,7 @@ they leave nothing, it only has to be found which of them pay; where next to not
 What they hardly touch is no hull's: then something may have changed under way, or keeps the plane back.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from math import log
 from typing import TYPE_CHECKING
 
@@ -52,7 +52,8 @@ DRIVE = (
 def at_the_outset(fitter: Fitter, jobs: int = 1) -> Explanation | None:
     """The root with all that every vehicle has, where that leaves much; None where it does not.
 
-    Where they lead nowhere, beside what changes at one moment or keeps the plane, if that leaves less.
+    Where they lead nowhere, beside what changes at one moment or keeps the plane back, if that leaves less;
+    where they leave much, beside the latter.
     """
     if fitter.excess(fitter.root.fit) < MUCH:
         return None
@@ -65,8 +66,12 @@ def at_the_outset(fitter: Fitter, jobs: int = 1) -> Explanation | None:
             return found
         best = min(best, found, key=lambda e: e.bic)
         if fitter.excess(best.fit) > LOST:
-            return min(best, _beside_what_leads(fitter, jobs), key=lambda e: e.bic)
-    return min(best, _by_fewer(fitter, best, jobs), key=lambda e: e.bic)
+            led = _beside_what_leads(fitter, (*SCANS, *DRIVE), jobs)
+            return min(best, led, key=lambda e: e.bic)
+    best = min(best, _by_fewer(fitter, best, jobs), key=lambda e: e.bic)
+    if fitter.excess(best.fit) > MUCH:
+        best = min(best, _beside_what_leads(fitter, DRIVE, jobs), key=lambda e: e.bic)
+    return best
 
 
 def _by_fewer(fitter: Fitter, whole: Explanation, jobs: int) -> Explanation:
@@ -95,10 +100,10 @@ def leads_on(fitter: Fitter, whole: Explanation) -> bool:
     return fitter.excess(whole.fit) < most
 
 
-def _beside_what_leads(fitter: Fitter, jobs: int) -> Explanation:
-    """All that every vehicle has with the likeliest change at one moment, or fault of the plane's drive."""
+def _beside_what_leads(fitter: Fitter, names: Iterable[str], jobs: int) -> Explanation:
+    """All that every vehicle has with the likeliest of these."""
     with Workers(fitter, jobs) as workers:
-        alone = workers.results([(Fitter.grown, (fitter.root, name, [])) for name in (*SCANS, *DRIVE)])
+        alone = workers.results([(Fitter.grown, (fitter.root, name, [])) for name in names])
         leading = sorted(alone, key=lambda e: e.bic)[:LEADING]
         found: list[Explanation] = workers.results([(all_beside, (one,)) for one in leading])
     return min(found, key=lambda e: e.bic)

@@ -10,6 +10,7 @@ from hidden_dive import hidden_dive
 
 from host.catalogue import ALONG_THE_HULL, FAINT, ORDINARY
 from host.catalogue.kin import OFFSETS
+from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis import outset, plane_choice
 from host.diagnosis import search as module
@@ -17,7 +18,7 @@ from host.diagnosis.diagnose import diagnose
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import LITTLE, MUCH
-from host.diagnosis.outset import FAR_LESS, LOST, at_the_outset, leads_on
+from host.diagnosis.outset import DRIVE, FAR_LESS, LOST, at_the_outset, leads_on
 from host.diagnosis.plane_choice import Way, likelier_first
 from host.diagnosis.search import Search
 from host.diagnosis.trims import retrimmed
@@ -104,9 +105,23 @@ def test_what_keeps_the_plane_back_is_tried_beside_all_as_changes_are(
     beside: list[Explanation] = []
     monkeypatch.setattr(Fitter, "grown", grown)
     monkeypatch.setattr(outset, "all_beside", lambda _, one: beside.append(one) or one)
-    found = outset._beside_what_leads(real, 1)
+    found = outset._beside_what_leads(real, (*SCANS, *DRIVE), 1)
     assert [one.bic for one in beside] == [-40.0, -30.0, -20.0]
     assert found.names == {"actuator_backlash"}
+
+
+@pytest.mark.parametrize(("left", "asked"), [(MUCH - 0.1, []), (MUCH + 0.1, [DRIVE])])
+def test_what_keeps_the_plane_back_is_asked_where_much_is_left(
+    left: float, asked: list[tuple[str, ...]], real: Fitter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried: list[tuple[str, ...]] = []
+    root_fit = real.root.fit
+    monkeypatch.setattr(outset, "says_all", lambda *_: False)
+    monkeypatch.setattr(outset, "_by_fewer", lambda _, whole, __: whole)
+    monkeypatch.setattr(outset, "_beside_what_leads", lambda f, names, _: tried.append(names) or f.root)
+    monkeypatch.setattr(real, "excess", lambda fit: 30.0 if fit is root_fit else left)
+    assert at_the_outset(real) is not None
+    assert tried == asked
 
 
 @pytest.mark.long
@@ -142,7 +157,7 @@ def test_where_it_leads_nowhere_something_may_have_changed(monkeypatch: pytest.M
     assert "ballast_change" in found.names
     assert found.leaves_white
     assert leads_on(fitter, found)
-    monkeypatch.setattr(outset, "_beside_what_leads", lambda fitter, _: fitter.root)
+    monkeypatch.setattr(outset, "_beside_what_leads", lambda fitter, *_: fitter.root)
     nowhere = at_the_outset(fitter)
     assert nowhere is not None
     assert not leads_on(fitter, nowhere)
