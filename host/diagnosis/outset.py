@@ -101,12 +101,12 @@ def leads_on(fitter: Fitter, whole: Explanation) -> bool:
 
 
 def _beside_what_leads(fitter: Fitter, names: Iterable[str], jobs: int) -> Explanation:
-    """All that every vehicle has with the likeliest of these."""
+    """All that every vehicle has with the likeliest of these, or that alone where the rest does not pay."""
     with Workers(fitter, jobs) as workers:
         alone = workers.results([(Fitter.grown, (fitter.root, name, [])) for name in names])
         leading = sorted(alone, key=lambda e: e.bic)[:LEADING]
         found: list[Explanation] = workers.results([(all_beside, (one,)) for one in leading])
-    return min(found, key=lambda e: e.bic)
+    return min([*leading, *found], key=lambda e: e.bic)
 
 
 def pushed_by_forces(search: "Search", whole: Explanation) -> Explanation | None:

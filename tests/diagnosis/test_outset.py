@@ -102,12 +102,18 @@ def test_what_keeps_the_plane_back_is_tried_beside_all_as_changes_are(
     def grown(_: Fitter, parent: Explanation, name: str, __: list[Array]) -> Explanation:
         return Explanation(frozenset({name}), parent.fit, likeliest.get(name, 0.0))
 
-    beside: list[Explanation] = []
+    def with_all(_: Fitter, one: Explanation) -> Explanation:
+        beside.append(one.bic)
+        return Explanation(one.names | {*ORDINARY}, one.fit, one.bic + pays)
+
     monkeypatch.setattr(Fitter, "grown", grown)
-    monkeypatch.setattr(outset, "all_beside", lambda _, one: beside.append(one) or one)
-    found = outset._beside_what_leads(real, (*SCANS, *DRIVE), 1)
-    assert [one.bic for one in beside] == [-40.0, -30.0, -20.0]
-    assert found.names == {"actuator_backlash"}
+    monkeypatch.setattr(outset, "all_beside", with_all)
+    for pays in (-1.0, 1.0):
+        beside: list[float] = []
+        found = outset._beside_what_leads(real, (*SCANS, *DRIVE), 1)
+        assert beside == [-40.0, -30.0, -20.0]
+        assert "actuator_backlash" in found.names
+        assert found.names.isdisjoint(ORDINARY) == (pays > 0.0)  # a textbook vehicle but for that
 
 
 @pytest.mark.parametrize(("left", "asked"), [(MUCH - 0.1, []), (MUCH + 0.1, [DRIVE])])
