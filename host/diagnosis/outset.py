@@ -104,7 +104,7 @@ def _beside_what_leads(fitter: Fitter, names: Iterable[str], jobs: int) -> Expla
     """All that every vehicle has with the likeliest of these, or that alone where the rest does not pay."""
     with Workers(fitter, jobs) as workers:
         alone = workers.results([(Fitter.grown, (fitter.root, name, [])) for name in names])
-        leading = sorted(alone, key=lambda e: e.bic)[:LEADING]
+        leading: list[Explanation] = sorted(alone, key=lambda e: e.bic)[:LEADING]
         found: list[Explanation] = workers.results([(all_beside, (one,)) for one in leading])
     return min([*leading, *found], key=lambda e: e.bic)
 
