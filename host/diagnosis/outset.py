@@ -38,7 +38,7 @@ MOST_FORCES = 0.1  # of the variance of all force: what acts is known but for a 
 FAR_LIKELIER = 0.1  # of BIC a sample, under random forces
 FAIR_PART = 0.02  # of what these explain, that what is missing should gain even beside them
 TURNING = ("munk_moment", "heave_pitch_rate_coupling")
-LEADING = 3  # of them, beside which all the rest is tried
+LEADING = 3  # of what may lead, beside which all the rest is tried
 DRIVE = (
     "actuator_backlash",
     "actuator_rate_limit",

@@ -45,3 +45,21 @@ def test_it_is_the_same_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr("host.all_rows._compiled", lambda: None)
     for one, other in zip(with_one, every(rows, parameters), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-15)
+
+
+@pytest.mark.parametrize("has_compiler", [True, False])
+def test_only_what_is_asked_for_is_worked_out(has_compiler: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    x, p = ca.SX.sym("x", 2), ca.SX.sym("p", 4)
+    value = ca.vertcat(p[0] * ca.sin(x[0]) + p[1] * x[1], p[2] * ca.exp(p[3] * x[0]) + x[1])
+    every = AllRows(ca.Function("slopes", [x, p], [ca.jacobian(value, x), ca.jacobian(value, p)]))
+    rows, parameters = np.random.default_rng(2).normal(size=(2, 70)), np.array([0.7, -1.3, 0.4, 0.2])
+    if not has_compiler:
+        monkeypatch.setattr("host.all_rows._compiled", lambda: None)
+    by_x, by_p = every(rows, parameters)
+    few = every.with_columns(1, (1, 3))
+    assert len(few._program) < len(every._program)
+    some_x, some_p = few(rows, parameters)
+    np.testing.assert_array_equal(some_x, by_x)
+    np.testing.assert_array_equal(some_p, by_p[:, :, [1, 3]])
+    assert every.with_columns(1, (0, 1, 2, 3)) is every
+    np.testing.assert_array_equal(every(rows, parameters)[1], by_p)  # which is as it was
