@@ -223,7 +223,9 @@ def test_what_pays_beside_them_is_named(thrown: tuple[Fitter, Explanation]) -> N
         assert told.best.fit.has_process_noise
 
 
-@pytest.mark.parametrize("why", ["little is left", "lost", "large forces", "as likely", "by speed", "gains"])
+@pytest.mark.parametrize(
+    "why", ["little is left", "lost", "large forces", "as likely", "by speed", "gains", "led"]
+)
 def test_else_the_search_goes_its_way(
     why: str, thrown: tuple[Fitter, Explanation], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -237,6 +239,8 @@ def test_else_the_search_goes_its_way(
     monkeypatch.setattr(outset, "are_by_speed", lambda *_: why == "by speed")
     gains = {"ballast_change": 500.0 if why == "gains" else 1.0}
     search: Any = type("S", (), {"fitter": fitter, "gains": lambda *_: gains})()
+    if why == "led":
+        whole = Explanation(whole.names | {"actuator_saturation"}, whole.fit, whole.bic)
     assert pushed_by_forces(cast("Search", search), whole) is None
 
 
