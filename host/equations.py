@@ -172,6 +172,10 @@ class Structure:
     effects: tuple[Effect, ...] = ()
 
     @cached_property
+    def effect_names(self) -> frozenset[str]:
+        return frozenset(effect.name for effect in self.effects)
+
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         return PARAMETERS + tuple(p for effect in self.effects for p in effect.parameters)
 

@@ -208,7 +208,7 @@ def _steered(search: "Search", points: list[Point], steps: int = FEW_STEPS) -> l
 
 
 def _climbed(fitter: "Fitter", point: Point, steps: int) -> Explanation:
-    names = frozenset(effect.name for effect in point.structure.effects)
+    names = point.structure.effect_names
     inputs = fitter.inputs(names, for_filter=True)
     holds_gain = not fitter.are_slight(point.noise)
     free = fitter.free(names)

@@ -293,7 +293,7 @@ class Fitter:
     def fitted(self, starts: list[Point], rival: Fit | None = None, first: int = FIRST_ITERATIONS) -> Fit:
         """Goes `first` steps from every start, and on from the best where it may get as far as the rival."""
         structure = starts[0].structure
-        names = frozenset(effect.name for effect in structure.effects)
+        names = structure.effect_names
         inputs, free = self.inputs(names), self.free(names)
         least = -np.inf if rival is None else rival.log_likelihood
         if starts[0].noise[2:].any():
@@ -311,14 +311,14 @@ class Fitter:
         """The log-likelihood at a point, but for a constant, by a filter where the point has forces."""
         if point.noise[2:].any():
             return likelihood(self, point)
-        names = frozenset(effect.name for effect in point.structure.effects)
+        names = point.structure.effect_names
         return -free_run_cost(point, self.inputs(names))
 
     def carried_on(self, start: Point, tolerance: float = SETTLED) -> Fit:
         """A fit from this point to its end, under random forces or waves where the point has them."""
         if start.noise[2:].any():
             return climbed(self, start, holds_noise=False)
-        names = frozenset(effect.name for effect in start.structure.effects)
+        names = start.structure.effect_names
         return output_error(start, self.inputs(names), self.free(names), tolerance=tolerance)
 
     def are_slight(self, noise: Array) -> bool:

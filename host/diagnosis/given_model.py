@@ -88,7 +88,7 @@ def _as_it_is(model: VehicleModel, recordings: list[Recording]) -> Explanation:
     inputs = [inputs_of(recording, structure) for recording in recordings]
     with np.errstate(over="ignore", invalid="ignore"):
         fit = output_error(start, inputs, nothing, most_iterations=0)
-    return Explanation(frozenset(effect.name for effect in structure.effects), fit, float("nan"))
+    return Explanation(structure.effect_names, fit, float("nan"))
 
 
 def _side(model: VehicleModel) -> Side:

@@ -29,7 +29,7 @@ def are_by_speed(fitter: Fitter, fit: Fit) -> bool:
 def densities(fitter: Fitter, fit: Fit) -> Array:
     """Spectral densities (2,) of force, (m/s^2)^2 s, and moment, (rad/s^2)^2 s, by the speed's errors."""
     p = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
-    names = frozenset(effect.name for effect in fit.structure.effects)
+    names = fit.structure.effect_names
     found = []
     for x0, inputs, recording in zip(
         fit.initial, fitter.inputs(names, for_filter=True), fitter.recordings, strict=True

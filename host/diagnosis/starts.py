@@ -104,7 +104,7 @@ def scanned(fitter: "Fitter", start: Point) -> Point:
     A moment that lay between the stretches an explanation was fitted to may lie anywhere between them, and of
     its likelihood, which has many maxima, none is seen from far.
     """
-    names = frozenset(effect.name for effect in start.structure.effects)
+    names = start.structure.effect_names
     own, free, inputs = start.structure.names, fitter.free(names), fitter.inputs(names)
     for k in (k for k, name in enumerate(own) if name in start.structure.moments and free[k]):
         first, last = fitter.held[FIRST], fitter.held[LAST]

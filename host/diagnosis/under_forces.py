@@ -25,7 +25,7 @@ def climbed(
     least    a log-likelihood: given up where it would not get there
     settled  of the log-likelihood: a step that gains less is the last
     """
-    names = frozenset(effect.name for effect in start.structure.effects)
+    names = start.structure.effect_names
     inputs, free = fitter.inputs(names, for_filter=True), fitter.free(names)
     if start.noise.size > 4:
         return in_waves_from(start, inputs, free, holds_noise=True, least=least, settled=settled)
@@ -37,6 +37,6 @@ def climbed(
 
 def likelihood(fitter: "Fitter", point: Point) -> float:
     """The log-likelihood of the filter at a point; -inf where it leaves the numbers."""
-    names = frozenset(effect.name for effect in point.structure.effects)
+    names = point.structure.effect_names
     under = likelihood_in_waves if point.noise.size > 4 else likelihood_under_forces
     return under(point, fitter.inputs(names, for_filter=True))

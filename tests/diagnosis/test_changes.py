@@ -178,7 +178,7 @@ def test_a_change_at_a_tried_moment_is_that_change(name: str) -> None:
     dive = hidden_dive(duration=30.0)
     beside = ("speed_loss", "munk_moment", "heave_quadratic_drag", "rudder_stall", "rudder_offset")
     known = {**BASE, "speed_time": 5.0, "c_ud": 2.0, "c_uq": 1.0, "c_qw": 0.4, "c_ww": -1.0}
-    known |= {"rudder_zero": 0.02, "stall_angle": 0.15, "stall_width": 0.1, "stall_share": 0.5, LAST: 30.0}
+    known |= {"rudder_zero": 0.02, "stall_angle": 0.15, "stall_loss": 1.0, "stall_share": 0.5, LAST: 30.0}
     entry = BY_NAME[name]
     size, when = entry.parameters[:2]
     tried = {sizes(name)[7]: 0.01}
