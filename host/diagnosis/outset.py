@@ -3,7 +3,8 @@
 The base equations bend so far to what a real vehicle has beside them that of its effects none alone says
 much, and the search that begins with each takes longest. All at once take no longer than two of them: where
 they leave nothing, it only has to be found which of them pay; where next to nothing, what acts beside them.
-What they hardly touch is no hull's: then something may have changed under way, or keeps the plane back.
+What they hardly touch is no hull's: then something may have changed under way, go with time or keep the plane
+back.
 """
 
 from collections.abc import Iterable, Iterator
@@ -16,6 +17,7 @@ from host.catalogue import ALONG_THE_HULL, FAINT, ORDINARY
 from host.catalogue.kin import OFFSETS
 from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
+from host.catalogue.unknown import WANDERING
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import ROUGHLY, Fitter
 from host.diagnosis.margins import LITTLE, MUCH, margin
@@ -47,13 +49,15 @@ DRIVE = (
     "rudder_stall",
 )
 """What may keep a plane from where it is commanded to: then no hull follows the commands."""
+IN_TIME = ("surface_waves", "internal_wave", "unknown_swinging_moment", *sorted(WANDERING))
+"""What swings with one period, or wanders. Of a sea it follows a part: little must be left beside it."""
 
 
 def at_the_outset(fitter: Fitter, jobs: int = 1) -> Explanation | None:
     """The root with all that every vehicle has, where that leaves much; None where it does not.
 
-    Where they lead nowhere, beside what changes at one moment or keeps the plane back, if that leaves less;
-    where they leave much, beside the latter.
+    Where they lead nowhere, beside what changes at one moment, goes with time or keeps the plane back, if
+    that leaves less; where they leave much, beside the latter two.
     """
     if fitter.excess(fitter.root.fit) < MUCH:
         return None
@@ -66,21 +70,24 @@ def at_the_outset(fitter: Fitter, jobs: int = 1) -> Explanation | None:
             return found
         best = min(best, found, key=lambda e: e.bic)
         if fitter.excess(best.fit) > LOST:
-            led = _beside_what_leads(fitter, (*SCANS, *DRIVE), jobs)
-            return min(best, led, key=lambda e: e.bic)
-    best = min(best, _by_fewer(fitter, best, jobs), key=lambda e: e.bic)
+            led = _beside_what_leads(fitter, (*SCANS, *DRIVE, *IN_TIME), jobs)
+            return min([best, *led], key=lambda e: e.bic)
+    best = min(best, _by_fewer(fitter, fitter.root, best, jobs), key=lambda e: e.bic)
     if fitter.excess(best.fit) > MUCH:
-        best = min(best, _beside_what_leads(fitter, DRIVE, jobs), key=lambda e: e.bic)
+        led = _beside_what_leads(fitter, (*DRIVE, *IN_TIME), jobs)
+        best = min([best, *led], key=lambda e: e.bic)
     return best
 
 
-def _by_fewer(fitter: Fitter, whole: Explanation, jobs: int) -> Explanation:
+def _by_fewer(fitter: Fitter, leading: Explanation, whole: Explanation, jobs: int) -> Explanation:
     """The same from where all but the faint ends, which leads some fits elsewhere, with the likeliest offset.
 
     That of the plane grows with the square of the speed, and a free trim, which does its work, does not.
+
+    leading  the root, or with what leads: where all of it begins
     """
     few = whole.names - {*FAINT, ALONG_THE_HULL}
-    lean = ended(fitter, begun_from(fitter, fitter.root, few), few)
+    lean = ended(fitter, begun_from(fitter, leading, few), few)
     with Workers(fitter, jobs) as workers:
         others = workers.results([(retrimmed, (lean, frozenset({name}))) for name in OFFSETS])
     best: Explanation = min([lean, *others], key=lambda e: e.bic)
@@ -100,13 +107,20 @@ def leads_on(fitter: Fitter, whole: Explanation) -> bool:
     return fitter.excess(whole.fit) < most
 
 
-def _beside_what_leads(fitter: Fitter, names: Iterable[str], jobs: int) -> Explanation:
-    """All that every vehicle has with the likeliest of these, or that alone where the rest does not pay."""
+def _beside_what_leads(fitter: Fitter, names: Iterable[str], jobs: int) -> list[Explanation]:
+    """The likeliest of these, each with all that every vehicle has and alone, where the rest does not pay.
+
+    The likeliest of all once more from where all but the faint ends, if something is left.
+    """
     with Workers(fitter, jobs) as workers:
         alone = workers.results([(Fitter.grown, (fitter.root, name, [])) for name in names])
         leading: list[Explanation] = sorted(alone, key=lambda e: e.bic)[:LEADING]
-        found: list[Explanation] = workers.results([(all_beside, (one,)) for one in leading])
-    return min([*leading, *found], key=lambda e: e.bic)
+        beside: list[Explanation] = workers.results([(all_beside, (one,)) for one in leading])
+    best, begun = min(zip(beside, leading, strict=True), key=lambda pair: pair[0].bic)
+    found = [*leading, *beside]
+    if fitter.excess(best.fit) > LITTLE:
+        found.append(_by_fewer(fitter, begun, best, jobs))
+    return [e for e in found if e.names.isdisjoint(IN_TIME) or fitter.excess(e.fit) < LITTLE]
 
 
 def pushed_by_forces(search: "Search", whole: Explanation) -> Explanation | None:
@@ -117,7 +131,7 @@ def pushed_by_forces(search: "Search", whole: Explanation) -> Explanation | None
     fault of the plane's drive may be another of these.
     """
     fitter = search.fitter
-    if not LITTLE < fitter.excess(whole.fit) < LOST or whole.names & {*SCANS, *DRIVE}:
+    if not LITTLE < fitter.excess(whole.fit) < LOST or whole.names & {*SCANS, *DRIVE, *IN_TIME}:
         return None
     sea = with_sea(fitter, whole)
     explained = as_filtered(fitter, whole).bic - sea.bic

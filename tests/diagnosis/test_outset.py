@@ -18,7 +18,7 @@ from host.diagnosis.diagnose import diagnose
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import LITTLE, MUCH
-from host.diagnosis.outset import DRIVE, FAR_LESS, LOST, at_the_outset, leads_on
+from host.diagnosis.outset import DRIVE, FAR_LESS, IN_TIME, LOST, at_the_outset, leads_on
 from host.diagnosis.plane_choice import Way, likelier_first
 from host.diagnosis.search import Search
 from host.diagnosis.trims import retrimmed
@@ -84,14 +84,16 @@ def test_an_offset_takes_the_place_of_the_free_trim_where_that_cannot_do_its_wor
         return Explanation(found.names, found.fit, found.bic - gain)
 
     monkeypatch.setattr(outset, "retrimmed", with_offset)
-    found = outset._by_fewer(real, whole, 1)
+    found = outset._by_fewer(real, real.root, whole, 1)
     assert ("rudder_offset" in found.names) == is_likelier
     assert (FREE_TRIM.name in found.names) != is_likelier
     assert found.names >= whole.names - {FREE_TRIM.name}
     lost = lambda _, __, names: Explanation(names, real.root.fit, 0.0)  # noqa: E731
     poor = lambda fitter, at, names: (lost if {*FAINT} & names else ended)(fitter, at, names)  # noqa: E731
     monkeypatch.setattr(outset, "ended", poor)
-    assert outset._by_fewer(real, whole, 1).names.isdisjoint(FAINT)  # what ended below its part is of no use
+    assert outset._by_fewer(real, real.root, whole, 1).names.isdisjoint(
+        FAINT
+    )  # what ended below its part is of no use
 
 
 def test_what_keeps_the_plane_back_is_tried_beside_all_as_changes_are(
@@ -106,25 +108,45 @@ def test_what_keeps_the_plane_back_is_tried_beside_all_as_changes_are(
         beside.append(one.bic)
         return Explanation(one.names | {*ORDINARY}, one.fit, one.bic + pays)
 
+    def by_fewer(_: Fitter, leading: Explanation, whole: Explanation, __: int) -> Explanation:
+        again.append((leading.bic, whole.bic))
+        return whole
+
     monkeypatch.setattr(Fitter, "grown", grown)
     monkeypatch.setattr(outset, "all_beside", with_all)
+    monkeypatch.setattr(outset, "_by_fewer", by_fewer)
     for pays in (-1.0, 1.0):
         beside: list[float] = []
-        found = outset._beside_what_leads(real, (*SCANS, *DRIVE), 1)
+        again: list[tuple[float, float]] = []
+        found = min(outset._beside_what_leads(real, (*SCANS, *DRIVE), 1), key=lambda e: e.bic)
         assert beside == [-40.0, -30.0, -20.0]
+        assert again == [(-40.0, -40.0 + pays)]  # the likeliest, as something is left
         assert "actuator_backlash" in found.names
         assert found.names.isdisjoint(ORDINARY) == (pays > 0.0)  # a textbook vehicle but for that
 
 
-@pytest.mark.parametrize(("left", "asked"), [(MUCH - 0.1, []), (MUCH + 0.1, [DRIVE])])
+@pytest.mark.parametrize("left", [LITTLE - 0.1, LITTLE + 0.1])
+def test_what_goes_with_time_alone_counts_where_little_is_left_beside_it(
+    left: float, real: Fitter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit = real.root.fit
+    monkeypatch.setattr(Fitter, "grown", lambda *a: Explanation(frozenset({a[2]}), fit, -len(a[2])))
+    monkeypatch.setattr(outset, "all_beside", lambda _, one: one)
+    monkeypatch.setattr(outset, "_by_fewer", lambda *a: a[2])
+    monkeypatch.setattr(real, "excess", lambda _: left)
+    found = {name for e in outset._beside_what_leads(real, (*IN_TIME, "rudder_stall"), 1) for name in e.names}
+    assert bool(found & {*IN_TIME}) == (left < LITTLE)
+
+
+@pytest.mark.parametrize(("left", "asked"), [(MUCH - 0.1, []), (MUCH + 0.1, [(*DRIVE, *IN_TIME)])])
 def test_what_keeps_the_plane_back_is_asked_where_much_is_left(
     left: float, asked: list[tuple[str, ...]], real: Fitter, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tried: list[tuple[str, ...]] = []
     root_fit = real.root.fit
     monkeypatch.setattr(outset, "says_all", lambda *_: False)
-    monkeypatch.setattr(outset, "_by_fewer", lambda _, whole, __: whole)
-    monkeypatch.setattr(outset, "_beside_what_leads", lambda f, names, _: tried.append(names) or f.root)
+    monkeypatch.setattr(outset, "_by_fewer", lambda *a: a[2])
+    monkeypatch.setattr(outset, "_beside_what_leads", lambda _, names, __: tried.append(names) or [])
     monkeypatch.setattr(real, "excess", lambda fit: 30.0 if fit is root_fit else left)
     assert at_the_outset(real) is not None
     assert tried == asked
@@ -163,18 +185,19 @@ def test_where_it_leads_nowhere_something_may_have_changed(monkeypatch: pytest.M
     assert "ballast_change" in found.names
     assert found.leaves_white
     assert leads_on(fitter, found)
-    monkeypatch.setattr(outset, "_beside_what_leads", lambda fitter, *_: fitter.root)
+    monkeypatch.setattr(outset, "_beside_what_leads", lambda *_: [])
     nowhere = at_the_outset(fitter)
     assert nowhere is not None
     assert not leads_on(fitter, nowhere)
 
 
-def test_water_that_swings_is_no_change_at_a_moment() -> None:
+def test_where_it_leads_nowhere_water_may_swing() -> None:
     fitter = Fitter([hidden_dive(swell, duration=60.0)])
     assert fitter.excess(fitter.root.fit) > LOST
     found = at_the_outset(fitter)
     assert found is not None
-    assert not leads_on(fitter, found)
+    assert "internal_wave" in found.names
+    assert leads_on(fitter, found)
 
 
 @pytest.mark.parametrize(
