@@ -8,12 +8,15 @@ from host.diagnosis.drift_fits import beside, drifting
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
-from host.diagnosis.margins import NAMING_MARGIN, TWIN_MARGIN
+from host.diagnosis.lone_form import likely_forms
+from host.diagnosis.margins import NAMING_MARGIN, TWIN_MARGIN, margin
+from host.diagnosis.prospects import form_gains
 from host.diagnosis.sea_fits import as_filtered, with_sea
 from host.diagnosis.search import Search
 from host.diagnosis.seas import Explained
 from host.diagnosis.together import with_more
 from host.diagnosis.trims import untrimmed
+from host.diagnosis.whole_vehicle import with_all_ordinary
 from host.diagnosis.workers import Workers
 
 CLEARLY = 2.0 * TWIN_MARGIN  # likelier: gusts and white forces may be all but the same
@@ -23,8 +26,8 @@ ROUNDS = 3  # of a search and of the levels beside what it found
 def in_drift(calm: Search, first: Explanation) -> Explained | None:
     """The search from a set of many beside what drifts with it.
 
-    None where in the end nothing does, or effects or random forces in the place of what drifts are likelier;
-    the search without it then remembers what was found.
+    None where in the end nothing does, or effects, a form of unknown physics or random forces in the place of
+    what drifts are likelier; the search without it then remembers what was found.
     While sets are compared what drifts stays as it was first found; it is estimated again beside the best.
     """
     fitter, found = calm.fitter, first
@@ -33,21 +36,32 @@ def in_drift(calm: Search, first: Explanation) -> Explained | None:
         found = search.run_from(untrimmed(search.fitter, found)) if number == 0 else search.settle(found)
         again = drifting(fitter, found)
         if again is None:
-            calm.remember(fitter.reduced(found, found.names))
+            _instead(calm, search, found)
             return None
         if again.bic > found.bic - TWIN_MARGIN or number == ROUNDS - 1:
             break
         found = again
-    instead = _with_effects_instead(calm, found)
+    instead = _instead(calm, search, found)
     if with_sea(fitter, found).bic < found.bic - CLEARLY or instead.bic < found.bic - NAMING_MARGIN:
         return None
     return Explained(found, search, leftover(search.fitter, found), None)
 
 
-def _with_effects_instead(calm: Search, found: Explanation) -> Explanation:
-    """What was found beside drift with a few effects more under white noise alone, which passed for drift."""
+def _instead(calm: Search, search: Search, found: Explanation) -> Explanation:
+    """What was found beside drift, under white noise alone with what may have passed for it: the likeliest.
+
+    That is a few effects more, or one form of unknown physics, with which all that every vehicle has joins.
+    """
     bare = calm.remember(calm.fitter.reduced(found, found.names))
-    return as_filtered(calm.fitter, with_more(calm, bare, least=0.0))
+    likely = likely_forms(form_gains(search.fitter, found), margin(found))
+    grown = calm.workers.results([(_with_form, (found, name)) for name in likely])
+    likeliest = map(calm.remember, sorted(grown, key=lambda e: e.bic)[:1])
+    sets = [with_more(calm, one, least=0.0) for one in (bare, *likeliest)]
+    return min((as_filtered(calm.fitter, one) for one in sets), key=lambda e: e.bic)
+
+
+def _with_form(fitter: Fitter, found: Explanation, name: str) -> Explanation:
+    return with_all_ordinary(fitter, fitter.grown(found, name, []))
 
 
 def among_drift(calm: Search, best: Explanation) -> Explained | None:

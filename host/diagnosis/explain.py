@@ -69,7 +69,7 @@ def explain(
         tried = search.tried.values()
         search = Search(fitter, workers, on_progress, fitter.base, fitter.root, alone=search.alone_so_far())
         search.is_second = is_second
-        best = search.run(again or _many_in(tried))
+        best = search.run(again or _many_in(fitter, tried))
     left, told, calm = leftover(fitter, best), None, best
     may_be_sea = part is None or part.best.fit.has_process_noise
     is_astray = may_be_sea and not (left.is_nothing or best.fit.has_process_noise)
@@ -159,10 +159,11 @@ def _alike(fitter: Fitter, like: Explanation | None) -> list[Explanation]:
     return [again] if fitter.excess(again.fit) < LITTLE else []
 
 
-def _many_in(tried: Iterable[Explanation]) -> list[Explanation]:
-    """The likeliest set of all that were tried, where it is one of many effects that leaves white noise."""
+def _many_in(fitter: Fitter, tried: Iterable[Explanation]) -> list[Explanation]:
+    """The likeliest set of all that were tried, where it is one of many effects and little is left."""
     best = min(tried, key=lambda e: e.bic)
-    return [best] if len(best.names) > LARGEST_SET and best.leaves_white else []
+    leaves_little = best.leaves_white or fitter.excess(best.fit) < LITTLE
+    return [best] if len(best.names) > LARGEST_SET and leaves_little else []
 
 
 def _found_in(part: Explained) -> list[Explanation]:

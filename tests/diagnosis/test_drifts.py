@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hidden_dive import Extra, hidden_dive, nothing
 
-from host.catalogue import UNKNOWN
+from host.catalogue import ORDINARY, UNKNOWN
 from host.diagnosis import drifts
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.drift_fits import beside, drifting
@@ -117,9 +117,28 @@ def test_what_was_found_beside_drift_that_is_not_there_is_remembered(
     coupled = fitter.grown(fitter.base, "heave_pitch_rate_coupling", [])
     search = Search(fitter, Workers(fitter, 1), lambda _: None, fitter.base, fitter.root)
     monkeypatch.setattr(drifts, "drifting", lambda *_: None)
+    monkeypatch.setattr(drifts, "form_gains", lambda *_: {})
+    monkeypatch.setattr(drifts, "with_more", lambda _, one, **__: one)
     monkeypatch.setattr(Search, "run_from", lambda *_: coupled)
     assert in_drift(search, found) is None
     assert coupled.names in search.tried
+
+
+def test_a_form_of_unknown_physics_may_have_passed_for_drift(
+    gusty: tuple[Fitter, Explanation], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitter, found = gusty
+    search = Search(fitter, Workers(fitter, 1), lambda _: None, fitter.base, fitter.root)
+    monkeypatch.setattr(drifts, "drifting", lambda *_: None)
+    monkeypatch.setattr(
+        drifts, "form_gains", lambda *_: {"unknown_force_w_w": 1e3, "unknown_moment_w_w": 0.0}
+    )
+    monkeypatch.setattr(drifts, "with_more", lambda _, one, **__: one)
+    monkeypatch.setattr(Search, "run_from", lambda *_: found)
+    assert in_drift(search, found) is None
+    (with_form,) = (names for names in search.tried if "unknown_force_w_w" in names)
+    assert {*ORDINARY} < with_form
+    assert not search.tried[with_form].fit.has_coloured_noise
 
 
 def test_what_drifts_on_a_part_is_looked_for_on_the_whole(gusty: tuple[Fitter, Explanation]) -> None:

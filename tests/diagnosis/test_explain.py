@@ -44,16 +44,21 @@ def test_else_the_search_begins_anew(like: Any, excess: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("names", "is_white", "is_begun_with"),
-    [(MANY, True, True), (MANY, False, False), (frozenset({"actuator_lag"}), True, False)],
-    ids=["many", "not all", "few"],
+    ("names", "is_white", "excess", "is_begun_with"),
+    [
+        (MANY, True, 1.3, True),
+        (MANY, False, LITTLE - 0.1, True),
+        (MANY, False, LITTLE + 0.1, False),
+        (frozenset({"actuator_lag"}), True, 1.0, False),
+    ],
+    ids=["white", "little", "not all", "few"],
 )
 def test_what_was_found_beside_drift_is_begun_with_where_it_is_many_effects(
-    names: frozenset[str], is_white: bool, is_begun_with: bool
+    names: frozenset[str], is_white: bool, excess: float, is_begun_with: bool
 ) -> None:
-    best: Any = SimpleNamespace(names=names, leaves_white=is_white, bic=-2.0)
+    best: Any = SimpleNamespace(names=names, leaves_white=is_white, bic=-2.0, fit=None)
     worse: Any = SimpleNamespace(names=MANY, leaves_white=True, bic=-1.0)
-    assert _many_in([worse, best]) == [best] * is_begun_with
+    assert _many_in(fitter_that_leaves(excess), [worse, best]) == [best] * is_begun_with
 
 
 NOTHING, MUCH_LEFT = (SimpleNamespace(is_nothing=one, is_by_speed=False) for one in (True, False))
