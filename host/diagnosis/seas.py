@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from host.catalogue import BY_NAME, named
+from host.catalogue.environment import WAVE_PERIODS
 from host.catalogue.kin import OFFSETS, as_trim
 from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import SWINGING_MOMENT
@@ -180,14 +181,13 @@ def among_waves(
     acts beside them. While sets are compared the waves stay as they were first found: beside the best set,
     or beside the named effects of that found without random forces, whichever is likelier.
     """
-    fitter, swing = rough.fitter, best.names & {SWINGING_MOMENT.name, WAVES}
+    fitter, swing = rough.fitter, _swinging_as_waves_do(best)
     if WAVES in best.names and not best.fit.has_process_noise:
         return rough, best, None  # regular ones
     if not (best.fit.has_process_noise or swing) or are_by_speed(fitter, best.fit):
         return rough, best, None
     rough.on_progress("waves")
-    # What swings in the band of waves may be the waves.
-    plain = best
+    plain = best  # what swings in the band of waves may be the waves
     for name in sorted(swing):
         plain = rough.without(plain, name)
     white = plain if plain.fit.has_process_noise else with_sea(fitter, plain)
@@ -200,6 +200,15 @@ def among_waves(
     if first.bic > least - NAMING_MARGIN or not is_sea(first.fit):
         return rough, best, None
     return searched_among(rough, first, least)
+
+
+def _swinging_as_waves_do(best: Explanation) -> Names:
+    """The members that swing with a period of surface waves."""
+    swings = {SWINGING_MOMENT.name: SWINGING_MOMENT, WAVES: named(WAVES)}
+    known = dict(zip(best.fit.structure.names, best.fit.parameters.tolist(), strict=True))
+    periods = {name: known[swings[name].parameters[-1].name] for name in best.names & swings.keys()}
+    shortest, longest = WAVE_PERIODS
+    return frozenset(name for name, period in periods.items() if shortest <= period <= longest)
 
 
 def _in_own_waves(search: Search, sets: list[Explanation]) -> list[Explanation]:

@@ -86,6 +86,23 @@ def test_a_band_broader_than_that_of_any_sea_is_no_waves(monkeypatch: pytest.Mon
         assert among_waves(search, base, fitter.base)[2] is None
 
 
+@pytest.mark.parametrize("period", [10.0, 37.0])
+def test_what_swings_may_be_waves_if_it_has_a_period_of_theirs(
+    period: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def moved(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+        return 0.0, 0.05 * np.sin(2.0 * np.pi * time / period), 0.0
+
+    fitter = Fitter([hidden_dive(moved, duration=90.0)])
+    swinging = fitter.grown(fitter.base, "unknown_swinging_moment", [])
+    monkeypatch.setattr("host.diagnosis.seas.is_sea", lambda _: False)
+    said: list[str] = []
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, said.append, fitter.base, fitter.root)
+        assert among_waves(search, search.remember(swinging), fitter.base) == (search, swinging.lean(), None)
+    assert ("waves" in said) == (period < 20.0)
+
+
 def test_what_only_passes_for_waves_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     rough = in_waves(lambda time, x, plane: (0.0, 0.0, 0.0), 0.02, 0.06)  # noqa: ARG005
     fitter = Fitter([hidden_dive(rough, duration=60.0)])
