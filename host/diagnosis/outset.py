@@ -8,7 +8,7 @@ back.
 """
 
 from collections.abc import Iterable, Iterator
-from math import log
+from math import inf, log
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +20,9 @@ from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import WANDERING
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import ROUGHLY, Fitter
+from host.diagnosis.lone_form import likely_forms
 from host.diagnosis.margins import LITTLE, MUCH, margin
+from host.diagnosis.prospects import form_gains
 from host.diagnosis.pruning import pruned
 from host.diagnosis.sea_fits import as_filtered, with_sea
 from host.diagnosis.speed_forces import are_by_speed
@@ -34,7 +36,7 @@ from host.gauss_newton import Point
 if TYPE_CHECKING:
     from host.diagnosis.search import Search
 
-FAR_LESS = 0.1  # of what the root leaves
+FAR_LESS = 0.2  # of what the root leaves
 LOST = 20.0  # times the noise floor: no hull leaves so much by what it is, but by what happens to it
 MOST_FORCES = 0.1  # of the variance of all force: what acts is known but for a tenth
 FAR_LIKELIER = 0.1  # of BIC a sample, under random forces
@@ -145,16 +147,32 @@ def pushed_by_forces(search: "Search", whole: Explanation) -> Explanation | None
 def goes_on_from(search: "Search", joint: Explanation) -> bool:
     """Whether many of a set of many pay, or of what else promises to beside them: then no search need begin.
 
+    Or beside a form of unknown physics, where what promises most leaves something and that form white noise.
     What pays is remembered. Of few, each alone tells more; and where something is left, a leading effect may.
     """
     search.on_progress("what every vehicle has")
     search.joint.add(joint.names)
-    joint = with_more(search, search.remember(joint), least=0.0)
-    is_all = joint.leaves_white or search.fitter.excess(joint.fit) < LITTLE
-    if is_all and is_real(pruned(search, joint).names):
+    more = with_more(search, search.remember(joint), least=0.0)
+    if not (more.leaves_white or search.fitter.excess(more.fit) < LITTLE):
+        more = min(more, _with_a_form(search, joint), key=lambda e: e.bic)
+    is_all = more.leaves_white or search.fitter.excess(more.fit) < LITTLE
+    if is_all and is_real(pruned(search, more).names):
         return True
     search.joint.clear()  # beside what the search finds they are tried again
     return False
+
+
+def _with_a_form(search: "Search", whole: Explanation) -> Explanation:
+    """The same with the likeliest form of unknown physics, where that leaves white noise; else itself.
+
+    What promised most of the catalogue may have been taken for it, so it is asked for without that.
+    """
+    likely = likely_forms(form_gains(search.fitter, whole), margin(whole))
+    grown: list[Explanation] = search.workers.results([search.growth(whole, name) for name in likely])
+    polished = search.polished_near(grown, min((e.bic for e in grown), default=inf))
+    best = min((e for e in polished if e.leaves_white), key=lambda e: e.bic, default=whole)
+    search.joint.add(best.names)
+    return best
 
 
 def _starts(fitter: Fitter, names: Names) -> Iterator[Point]:

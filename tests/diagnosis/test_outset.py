@@ -23,6 +23,7 @@ from host.diagnosis.plane_choice import Way, likelier_first
 from host.diagnosis.search import Search
 from host.diagnosis.trims import retrimmed
 from host.diagnosis.whole_vehicle import ended
+from host.diagnosis.workers import Workers
 from host.read_recordings import read_recordings
 from host.recording import Array
 from host.vehicle import default_vehicle
@@ -201,23 +202,26 @@ def test_where_it_leads_nowhere_water_may_swing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("pays", "left", "said"),
+    ("pays", "left", "with_form", "said"),
     [
-        (MANY, 1.3, ["concluded"]),  # of white noise, whose size the sensors show too small
-        (MANY, 1.1, ["concluded"]),
-        (FEW, 1.0, ["singles", "concluded"]),
-        (MANY, 1.4, ["singles", "concluded"]),
+        (MANY, 1.3, 1.4, ["concluded"]),  # of white noise, whose size the sensors show too small
+        (MANY, 1.1, 1.4, ["concluded"]),
+        (FEW, 1.0, 1.4, ["singles", "concluded"]),
+        (MANY, 1.4, 1.4, ["singles", "concluded"]),
+        (MANY, 1.4, 1.3, ["concluded"]),
+        (FEW, 1.4, 1.3, ["singles", "concluded"]),
     ],
-    ids=["white", "little", "few", "something left"],
+    ids=["white", "little", "few", "something left", "a form", "a form beside few"],
 )
 def test_a_search_goes_on_with_many_or_begins_with_single_effects(
-    pays: frozenset[str], left: float, said: list[str], monkeypatch: pytest.MonkeyPatch
+    pays: frozenset[str], left: float, with_form: float, said: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def found(names: frozenset[str]) -> Any:
+    def found(names: frozenset[str], left: float = left) -> Any:
         fit, white = SimpleNamespace(left=left), left == 1.3
-        return SimpleNamespace(names=names, bic=0.0, fit=fit, leaves_white=white, lean=lambda: found(names))
+        return SimpleNamespace(names=names, bic=left, fit=fit, leaves_white=white, lean=lambda: found(names))
 
     calls: list[str] = []
+    monkeypatch.setattr(outset, "_with_a_form", lambda _, whole: found(whole.names, with_form))
     monkeypatch.setattr(outset, "with_more", lambda _, best, **__: best)
     monkeypatch.setattr(outset, "pruned", lambda *_: found(pays))
     monkeypatch.setattr(module, "beam_search", lambda _: calls.append("singles"))
@@ -228,6 +232,17 @@ def test_a_search_goes_on_with_many_or_begins_with_single_effects(
     search.run()
     assert calls == said
     assert bool(search.joint) is (said == ["concluded"])
+
+
+@pytest.mark.parametrize("is_white", [True, False])
+def test_a_form_beside_all_that_every_vehicle_has_must_leave_white_noise(
+    is_white: bool, real: Fitter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search = Search(real, Workers(real, 1), lambda _: None, real.base, real.root)
+    monkeypatch.setattr(outset, "form_gains", lambda *_: {"unknown_force_w_w": 1e3, "unknown_force_w_q": 0.0})
+    monkeypatch.setattr(Explanation, "leaves_white", property(lambda _: is_white))
+    found = outset._with_a_form(search, search.remember(real.root))
+    assert found.names - real.root.names == ({"unknown_force_w_w"} if is_white else set())
 
 
 def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> None:
