@@ -7,7 +7,9 @@ from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, ROUGH, margin
+from host.diagnosis.pruning import pruned
 from host.diagnosis.trims import retrimmed
+from host.diagnosis.whole_vehicle import is_real
 from host.diagnosis.workers import Task
 
 if TYPE_CHECKING:
@@ -15,6 +17,7 @@ if TYPE_CHECKING:
 
 LEADING = 8  # sets with a free trim that are looked at
 CONTENDERS = 3  # of them, for the first place
+LIKELY = 2  # offsets that may stand alone
 BENT_BY_A_ZERO = ("speed_loss", "actuator_saturation", "rudder_stall", "rudder_effectiveness_change")
 """What depends on the plane's angle as no constant force and moment do."""
 
@@ -55,6 +58,20 @@ def with_likeliest_offsets(search: "Search", best: Explanation) -> Explanation:
     tasks: list[Task] = [(retrimmed, (best, way)) for way in sorted(ways, key=sorted)]
     found = [search.remember(e) for e in search.workers.results(tasks)]
     return min([best, *search.polished_near(found, best.bic)], key=lambda e: e.bic)
+
+
+def with_one_offset(search: "Search", best: Explanation) -> Explanation:
+    """The set with one offset in place of two, where that is likelier with all that every vehicle has.
+
+    Two are free to follow what is lacking; a zero error of the plane, which pushes and turns at once, is not.
+    """
+    if len(best.names & {*OFFSETS}) < 2 or not is_real(best.names) or search.root.fit.has_process_noise:
+        return best
+    search.on_progress("one offset in place of two")
+    ones = search.workers.results([(retrimmed, (best, frozenset({name}))) for name in OFFSETS])
+    likely = sorted(ones, key=lambda e: e.bic)[:LIKELY]
+    lean = [pruned(search, search.remember(search.completion(search.remember(one)))) for one in likely]
+    return min([best, *lean], key=lambda e: e.bic)
 
 
 def with_offset(search: "Search", beam: list[Explanation]) -> list[Explanation]:

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from host.diagnosis.search import Search
 
 FAR_LESS = 0.2  # of what the root leaves
+HALF = 0.5  # of what is left: a fault of the drive is no small part of it where it leads
 LOST = 20.0  # times the noise floor: no hull leaves so much by what it is, but by what happens to it
 MOST_FORCES = 0.1  # of the variance of all force: what acts is known but for a tenth
 FAR_LIKELIER = 0.1  # of BIC a sample, under random forces
@@ -72,11 +73,11 @@ def at_the_outset(fitter: Fitter, jobs: int = 1) -> Explanation | None:
             return found
         best = min(best, found, key=lambda e: e.bic)
         if fitter.excess(best.fit) > LOST:
-            led = _beside_what_leads(fitter, (*SCANS, *DRIVE, *IN_TIME), jobs)
+            led = _beside_what_leads(fitter, best, (*SCANS, *DRIVE, *IN_TIME), jobs)
             return min([best, *led], key=lambda e: e.bic)
     best = min(best, _by_fewer(fitter, fitter.root, best, jobs), key=lambda e: e.bic)
     if fitter.excess(best.fit) > MUCH:
-        led = _beside_what_leads(fitter, (*DRIVE, *IN_TIME), jobs)
+        led = _beside_what_leads(fitter, best, (*DRIVE, *IN_TIME), jobs)
         best = min([best, *led], key=lambda e: e.bic)
     return best
 
@@ -109,10 +110,14 @@ def leads_on(fitter: Fitter, whole: Explanation) -> bool:
     return fitter.excess(whole.fit) < most
 
 
-def _beside_what_leads(fitter: Fitter, names: Iterable[str], jobs: int) -> list[Explanation]:
+def _beside_what_leads(
+    fitter: Fitter, whole: Explanation, names: Iterable[str], jobs: int
+) -> list[Explanation]:
     """The likeliest of these, each with all that every vehicle has and alone, where the rest does not pay.
 
     The likeliest of all once more from where all but the faint ends, if something is left.
+
+    whole  all that every vehicle has without these
     """
     with Workers(fitter, jobs) as workers:
         alone = workers.results([(Fitter.grown, (fitter.root, name, [])) for name in names])
@@ -122,7 +127,15 @@ def _beside_what_leads(fitter: Fitter, names: Iterable[str], jobs: int) -> list[
     found = [*leading, *beside]
     if fitter.excess(best.fit) > LITTLE:
         found.append(_by_fewer(fitter, begun, best, jobs))
-    return [e for e in found if e.names.isdisjoint(IN_TIME) or fitter.excess(e.fit) < LITTLE]
+    return [e for e in found if _is_no_chance(fitter, e, whole)]
+
+
+def _is_no_chance(fitter: Fitter, led: Explanation, whole: Explanation) -> bool:
+    """Whether what leads does more than follow a part of a sea, as many may a little."""
+    left = fitter.excess(led.fit)
+    if left < LITTLE or led.names & {*SCANS}:
+        return True
+    return led.names.isdisjoint(IN_TIME) and left < HALF * fitter.excess(whole.fit)
 
 
 def pushed_by_forces(search: "Search", whole: Explanation) -> Explanation | None:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, select_autoescape
 
-from host.catalogue import BY_NAME
+from host.catalogue import BY_NAME, structure_of
 from host.catalogue.moments import SCANS
 from host.diagnosis.answer import Against, Answer
 from host.diagnosis.comparison import Status
@@ -146,7 +146,8 @@ def _dated(effect: NamedEffect) -> str:
     """Its title, and the moment of what came at one."""
     if effect.name not in SCANS or not effect.coefficients:
         return title(effect.name)
-    moment, _, unit = list(effect.coefficients.values())[-1]
+    (name,) = structure_of((effect.name,)).moments
+    moment, _, unit = effect.coefficients[name]
     return f"{title(effect.name)} (at {moment:.0f} {unit})"
 
 

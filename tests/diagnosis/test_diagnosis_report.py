@@ -5,11 +5,13 @@ from pathlib import Path
 
 import pytest
 
+from host.catalogue import BY_NAME
+from host.catalogue.moments import SCANS
 from host.diagnosis.answer import Against, Answer
 from host.diagnosis.comparison import compare, side_of
 from host.diagnosis.diagnose import Diagnosis, NamedEffect
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.report import write_report
+from host.diagnosis.report import _dated, write_report
 from host.diagnosis.separation import separations
 
 
@@ -52,7 +54,11 @@ def test_after_an_alarm_it_is_said_what_changed_and_when_or_that_nothing_did(
 ) -> None:
     alarmed = replace(coupled, recordings=[replace(r, alarms=(60.0,)) for r in coupled.recordings])
     assert "Near 60 s nothing was found to have changed" in page(Answer(found=alarmed), tmp_path)
-    coefficients = {"current_step": (0.03, 0.001, "m/s"), "current_change_time": (47.2, 0.1, "s")}
+    coefficients = {
+        "current_step": (0.03, 0.001, "m/s"),
+        "current_change_time": (47.2, 0.1, "s"),
+        "carried_share": (0.5, 0.1, "1"),  # a detail after it
+    }
     change = NamedEffect(name="current_change", delta_bic=99.0, coefficients=coefficients)
     shown = page(Answer(found=replace(alarmed, effects=[change])), tmp_path)
     assert "current change (at 47 s)" in shown
@@ -74,3 +80,11 @@ def test_what_is_not_explained_is_not_recommended(coupled: Diagnosis, tmp_path: 
     shown = page(Answer(found=replace(coupled, verdict="unexplained")), tmp_path)
     assert "The nearest of the catalogue" in shown
     assert "Use extended_model.json" not in shown
+
+
+@pytest.mark.parametrize("name", [*SCANS])
+def test_each_change_has_one_moment_to_tell(name: str) -> None:
+    coefficients = {p.name: (float(k), 0.1, p.unit) for k, p in enumerate(BY_NAME[name].parameters)}
+    (time,) = (p.name for p in BY_NAME[name].parameters if p.name.endswith("_time"))
+    told = _dated(NamedEffect(name=name, delta_bic=99.0, coefficients=coefficients))
+    assert told.endswith(f"(at {coefficients[time][0]:.0f} s)")

@@ -116,27 +116,37 @@ def test_what_keeps_the_plane_back_is_tried_beside_all_as_changes_are(
     monkeypatch.setattr(Fitter, "grown", grown)
     monkeypatch.setattr(outset, "all_beside", with_all)
     monkeypatch.setattr(outset, "_by_fewer", by_fewer)
+    monkeypatch.setattr(outset, "_is_no_chance", lambda *_: True)
     for pays in (-1.0, 1.0):
         beside: list[float] = []
         again: list[tuple[float, float]] = []
-        found = min(outset._beside_what_leads(real, (*SCANS, *DRIVE), 1), key=lambda e: e.bic)
+        found = min(outset._beside_what_leads(real, real.root, (*SCANS, *DRIVE), 1), key=lambda e: e.bic)
         assert beside == [-40.0, -30.0, -20.0]
         assert again == [(-40.0, -40.0 + pays)]  # the likeliest, as something is left
         assert "actuator_backlash" in found.names
         assert found.names.isdisjoint(ORDINARY) == (pays > 0.0)  # a textbook vehicle but for that
 
 
-@pytest.mark.parametrize("left", [LITTLE - 0.1, LITTLE + 0.1])
-def test_what_goes_with_time_alone_counts_where_little_is_left_beside_it(
-    left: float, real: Fitter, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("name", "left", "counts"),
+    [
+        ("unknown_swinging_moment", LITTLE - 0.1, True),
+        ("unknown_swinging_moment", LITTLE + 0.1, False),  # of many waves it follows one
+        ("rudder_stall", 4.9, True),
+        ("rudder_stall", 5.1, False),
+        ("ballast_change", 9.0, True),
+    ],
+)
+def test_what_leads_must_be_more_than_a_part_of_a_sea(
+    name: str, left: float, counts: bool, real: Fitter, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fit = real.root.fit
-    monkeypatch.setattr(Fitter, "grown", lambda *a: Explanation(frozenset({a[2]}), fit, -len(a[2])))
+    fit = real.base.fit
+    monkeypatch.setattr(Fitter, "grown", lambda *a: Explanation(frozenset({a[2]}), fit, 0.0))
     monkeypatch.setattr(outset, "all_beside", lambda _, one: one)
     monkeypatch.setattr(outset, "_by_fewer", lambda *a: a[2])
-    monkeypatch.setattr(real, "excess", lambda _: left)
-    found = {name for e in outset._beside_what_leads(real, (*IN_TIME, "rudder_stall"), 1) for name in e.names}
-    assert bool(found & {*IN_TIME}) == (left < LITTLE)
+    monkeypatch.setattr(real, "excess", lambda of: left if of is fit else 10.0)
+    found = outset._beside_what_leads(real, real.root, (name,), 1)
+    assert {n for one in found for n in one.names} == ({name} if counts else set())
 
 
 @pytest.mark.parametrize(("left", "asked"), [(MUCH - 0.1, []), (MUCH + 0.1, [(*DRIVE, *IN_TIME)])])
@@ -147,7 +157,7 @@ def test_what_keeps_the_plane_back_is_asked_where_much_is_left(
     root_fit = real.root.fit
     monkeypatch.setattr(outset, "says_all", lambda *_: False)
     monkeypatch.setattr(outset, "_by_fewer", lambda *a: a[2])
-    monkeypatch.setattr(outset, "_beside_what_leads", lambda _, names, __: tried.append(names) or [])
+    monkeypatch.setattr(outset, "_beside_what_leads", lambda _, __, names, ___: tried.append(names) or [])
     monkeypatch.setattr(real, "excess", lambda fit: 30.0 if fit is root_fit else left)
     assert at_the_outset(real) is not None
     assert tried == asked

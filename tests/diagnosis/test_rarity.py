@@ -10,7 +10,7 @@ from host.diagnosis import rarity
 from host.diagnosis.exchange import twins
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
-from host.diagnosis.offset_choice import with_likeliest_offsets
+from host.diagnosis.offset_choice import with_likeliest_offsets, with_one_offset
 from host.diagnosis.rarity import _pays, told_by_the_usual
 from host.diagnosis.search import Search
 from host.diagnosis.whole_vehicle import with_all_ordinary
@@ -117,3 +117,16 @@ def test_an_offset_is_asked_again_beside_what_took_the_place_of_another() -> Non
     assert with_likeliest_offsets(search, best).names == best.names - {"rudder_offset"} | {"trim_moment"}
     plain = search.without(best, "rudder_offset")
     assert with_likeliest_offsets(search, plain) is plain
+
+
+def test_two_offsets_give_way_to_one_with_all_that_every_vehicle_has() -> None:
+    recording = real_hull(hidden_dive(duration=60.0), SERVO, 60.0)
+    bent = replace(recording, rudder=recording.rudder - 0.02)
+    search, two = searched(bent, *REAL, "net_buoyancy", "trim_moment")
+    one = with_one_offset(search, two)
+    assert "rudder_offset" in one.names
+    assert one.names.isdisjoint({"net_buoyancy", "trim_moment"})
+    assert one.bic < two.bic
+    assert with_one_offset(search, one) is one
+    search, few = searched(bent, "net_buoyancy", "trim_moment")
+    assert with_one_offset(search, few) is few  # a textbook's vehicle: fewest names were asked of it
