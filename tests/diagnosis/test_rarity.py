@@ -120,7 +120,7 @@ def test_an_offset_is_asked_again_beside_what_took_the_place_of_another() -> Non
 
 
 def test_two_offsets_give_way_to_one_with_all_that_every_vehicle_has() -> None:
-    recording = real_hull(hidden_dive(duration=60.0), SERVO, 60.0)
+    recording = real_hull(hidden_dive(duration=30.0), SERVO, 30.0)
     bent = replace(recording, rudder=recording.rudder - 0.02)
     search, two = searched(bent, *REAL, "net_buoyancy", "trim_moment")
     one = with_one_offset(search, two)
