@@ -116,8 +116,8 @@ class Search:
         """The best set with offsets in the place of its free trim, settled, and what only then shows."""
         self.on_progress("settling")
         found = self._settled(with_best_offsets(self))
-        best = told_by_the_usual(self, whole(self, completed(self, found)))
-        return with_one_offset(self, best if best is found else with_likeliest_offsets(self, best))
+        best = with_one_offset(self, told_by_the_usual(self, whole(self, completed(self, found))))
+        return best if best is found else with_likeliest_offsets(self, best)
 
     def singles(self) -> list[Explanation]:
         """Each effect alone on top of the root; what else may change, where the likeliest is a change."""
