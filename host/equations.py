@@ -21,6 +21,7 @@ from host.recording import Array
 
 Slot = Literal["heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment"]
 STATES = ("w", "q", "theta", "zeta")
+START = (*STATES, "excess")  # what a run begins with: u / u0 - 1 acts where speed is a state
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,6 +62,7 @@ class Chain:
 
     p            parameters by name
     extra        states of effects by name
+    excess       u / u0 - 1 at the first row, where speed is not measured
     speed        u, m/s, measured where `is_speed_known` is 1; `speed_ratio` u / u0, on which forces depend;
     surge        u', m/s^2, of the measured speed
     command      rad, the plane as commanded; `earlier` the commands of the rows before, newest first
@@ -95,6 +97,7 @@ class Chain:
     pitch: ca.SX = field(default_factory=lambda: ca.SX(0))
     climb: ca.SX = field(default_factory=lambda: ca.SX(0))
     rates: dict[str, ca.SX] = field(default_factory=dict)
+    excess: ca.SX = field(default_factory=lambda: ca.SX(0))
     sensed_pitch: ca.SX = field(default_factory=lambda: ca.SX(0))
     sensed_depth: ca.SX = field(default_factory=lambda: ca.SX(0))
 
@@ -297,11 +300,12 @@ class Structure:
         return ca.vertcat(chain.sensed_pitch, chain.sensed_depth)
 
     def initial(self, x0: ca.SX, parameters: ca.SX, drive: ca.SX) -> ca.SX:
-        """All states at the first row from the four of the base."""
-        count = len(self.states) - len(STATES)
-        chain = self.chain(ca.vertcat(x0, ca.SX(count, 1)), parameters, drive, drive[4])
+        """All states at the first row from what a run begins with (5,), see START."""
+        base, count = x0[: len(STATES)], len(self.states) - len(STATES)
+        chain = self.chain(ca.vertcat(base, ca.SX(count, 1)), parameters, drive, drive[4])
+        chain.excess = x0[len(STATES)]
         own = [effect.initial(chain) for effect in self.effects if effect.initial is not None]
-        return ca.vertcat(x0, *own)
+        return ca.vertcat(base, *own)
 
 
 BASE = Structure()

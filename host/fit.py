@@ -27,7 +27,7 @@ class Fit:
     parameters   (n,) in the order of structure.names
     free         (n,) False where the parameter was held
     information  (n, n) Fisher information of the parameters, initial states eliminated; zero for held ones
-    initial      states (4,) at each recording's first row
+    initial      what each recording begins with, host.equations.START (5,)
     noise        (4,) variances of pitch rad^2, depth m^2; densities of unknown heave, pitch acceleration,
                  or of what stands for them among waves
     wander       variance and correlation time s of the part of each sensor's error, pitch and depth, that

@@ -15,12 +15,13 @@ from host.straightened import slopes, stepped
 
 Mask = NDArray[np.bool_]
 SHORTER = (1e-9, 1e-6, 1e-4)  # dampings, of which the first is as good as none
-INITIAL_STATE_PRIOR = np.array([1.0, 1.0, 1.0, 100.0])  # std of w, q, theta, zeta; keeps short dives solvable
+# std of host.equations.START; keeps short dives solvable
+INITIAL_STATE_PRIOR = np.array([1.0, 1.0, 1.0, 100.0, 0.3])
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A point of the search: parameters, initial states (4,) of each recording, noise (4,), in waves (7,)."""
+    """A point of the search: parameters, what each recording begins with (5,), noise (4,), in waves (7,)."""
 
     structure: Structure
     parameters: Array
@@ -59,7 +60,7 @@ def _normal(error: Array, scores: Array, free: Mask) -> tuple[Array, Array]:
 class GaussNewton:
     """Normal equations of one iteration.
 
-    white  whitened innovations (2, N) and sensitivities (2, parameters + 4, N) of each recording
+    white  whitened innovations (2, N) and sensitivities (2, parameters + 5, N) of each recording
     """
 
     def __init__(self, white: list[tuple[Array, Array]], point: Point, free: Mask) -> None:
@@ -67,7 +68,7 @@ class GaussNewton:
         self._add_up([_normal(error, scores, free) for error, scores in white])
 
     def with_normal(self, normal: list[tuple[Array, Array]]) -> "GaussNewton":
-        """The same with other matrices and right-hand sides of the free parameters + 4 for each recording."""
+        """The same with other matrices and right-hand sides of the free parameters + 5 for each recording."""
         other = copy(self)
         other._add_up(normal)
         return other

@@ -62,10 +62,11 @@ def predict(model: VehicleModel, recording: Recording) -> Prediction:
 
 
 def estimate_initial_state(parameters: Array, opening: Recording, whole: Inputs) -> Array:
-    """Weighted least squares for [w, q, theta, zeta] at the first row of `opening`.
+    """Weighted least squares for [w, q, theta, zeta, u / u0 - 1] at the first row of `opening`.
 
     The equations are linear in the state, so Gauss-Newton steps from the first measurements end at once.
-    Weights: 0.1 deg and 1 cm; 0.5 m/s and 0.5 rad/s of prior hold what a few samples leave open.
+    Weights: 0.1 deg and 1 cm; 0.5 m/s, 0.5 rad/s and a tenth of the speed, of prior, hold what a few samples
+    leave open.
     """
     rows = opening.time.size
     inputs = Inputs(
@@ -82,8 +83,8 @@ def estimate_initial_state(parameters: Array, opening: Recording, whole: Inputs)
             f"{opening.name}: no {lacking} in the first {SETTLING_SPAN:g} s, from which the free run starts"
         )
     first = [float(inputs.measured[i, inputs.present[i] > 0.0][0]) for i in range(2)]
-    centre = np.array([0.0, 0.0, first[0], first[1]])
-    prior = np.diag(np.array([0.5, 0.5, 0.2, 2.0]) ** -2.0)
+    centre = np.array([0.0, 0.0, first[0], first[1], 0.0])
+    prior = np.diag(np.array([0.5, 0.5, 0.2, 2.0, 0.1]) ** -2.0)
     weight = np.array([np.deg2rad(0.1), 0.01]) ** -2.0
     x = centre.copy()
     for _ in range(3):

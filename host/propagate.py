@@ -13,12 +13,12 @@ import casadi as ca
 import numpy as np
 
 from host.drift import NOT_WHITENED, Whitenings
-from host.equations import BASE, STATES, Chain, Structure
+from host.equations import BASE, START, Chain, Structure
 from host.over_rows import KEPT, over_rows
 from host.recording import Array, Recording
 from host.speed import smoothed_speed
 
-NX0 = len(STATES)
+NX0 = len(START)
 MOST_SUBSTEPS = 8  # slow records show no modes faster than their sampling: finer steps would resolve nothing
 LONGEST_SUBSTEP = 0.05  # s; for a 10 rad/s mode the error of one sub-step is below 3e-4 of its change
 LONGEST_OF_ALL = 0.5  # s; a quarter of the shortest period of a wave
@@ -212,7 +212,7 @@ def _followed(form: Form, of: Callable[[Chain], ca.SX]) -> ca.Function:
 
 @lru_cache(KEPT)
 def _initial(form: Form) -> ca.Function:
-    """All states at the first row, and their derivatives by the parameters and the four base states."""
+    """All states at the first row, and their derivatives by the parameters and what a run begins with."""
     x0, (_, p, drive) = ca.SX.sym("x0", NX0), form.symbols()
     x = form.structure.initial(x0, p, drive)
     slopes = ca.horzcat(ca.jacobian(x, p), ca.jacobian(x, x0))
@@ -232,8 +232,10 @@ def form_of(inputs: Inputs) -> Form:
 
 
 def start_of(form: Form, parameters: Array, initial: Array, inputs: Inputs) -> tuple[Array, Array]:
-    """All states at the first row (nx,), and their derivatives by the parameters and the base states."""
-    x, slopes = _initial(form)(initial, inputs.widened(parameters), inputs.drive[:, 0])
+    """All states at the first row (nx,), and their derivatives by the parameters and by `initial` (5,)."""
+    begun = np.zeros(NX0)
+    begun[: initial.size] = initial  # at the speed of steady flight, where it is not said
+    x, slopes = _initial(form)(begun, inputs.widened(parameters), inputs.drive[:, 0])
     columns = [*inputs.own, *range(form.np, form.np + NX0)]
     return np.asarray(x, dtype=float).ravel(), np.asarray(slopes, dtype=float)[:, columns]
 
@@ -253,7 +255,7 @@ class Run:
 
 
 def free_run(parameters: Array, initial: Array, inputs: Inputs) -> Run:
-    """Simulates from the base states [w, q, theta, zeta] (4,) at the first row, blind to the measurements."""
+    """Simulates from [w, q, theta, zeta, u / u0 - 1] (5,) at the first row, blind to the measurements."""
     form = form_of(inputs)
     start, _ = start_of(form, parameters, initial, inputs)
     table = over_rows(_free_run, form, inputs.drive.shape[1])(start, inputs.drive, inputs.widened(parameters))

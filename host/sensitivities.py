@@ -26,7 +26,7 @@ SETS_KEPT = 256  # of those that share equations
 def innovations(
     parameters: Array, initial: Array, inputs: Inputs, gains: Array | None = None
 ) -> tuple[Array, Array]:
-    """Innovations e = y - yhat (2, N) and the predictions' sensitivities (2, parameters + 4, N).
+    """Innovations e = y - yhat (2, N) and the predictions' sensitivities (2, parameters + 5, N).
 
     gains  (2 nx, N) Kalman gain of each row, column-major nx x 2; None for output error (free run).
            The derivative is taken at fixed gain.
@@ -43,7 +43,7 @@ def innovations(
 def sensitivities(
     parameters: Array, initial: Array, inputs: Inputs, run: Run, gains: Array | None = None
 ) -> Array:
-    """Sensitivities (2, parameters + 4, N) of a run's outputs, 0 where nothing was measured."""
+    """Sensitivities (2, parameters + 5, N) of a run's outputs, 0 where nothing was measured."""
     form, rows = form_of(inputs), inputs.drive.shape[1]
     _, start = start_of(form, parameters, initial, inputs)
     with np.errstate(all="ignore"):  # a run that leaves the numbers is seen by its size

@@ -153,7 +153,7 @@ def _heave_model(stretches: list[_Stretch], theta: list[Array], a1: float) -> _F
 def start_values(recordings: list[Recording]) -> list[tuple[Array, list[Array]]]:
     """Start points for the likelihood search, best first: one, or more where the grid has several valleys.
 
-    Each is (parameters (8,) in the order of host.equations.NAMES, initial states (4,) of each recording).
+    Each is (parameters (8,) in the order of host.equations.NAMES, what each begins with (5,)).
     """
     rows = sum(r.time.size for r in recordings)
     stretches = [_Stretch(r, 1 + rows // LARGEST_FIT) for r in recordings]
@@ -169,7 +169,7 @@ def start_values(recordings: list[Recording]) -> list[tuple[Array, list[Array]]]
             u0 = heave.gains[2] if speed is None else speed
             gains = [a1, a2, a3, heave.gains[0], pitch.gains[0], u0, heave.gains[1], pitch.gains[1]]
             initial = [
-                np.array([w, q, theta, zeta])
+                np.array([w, q, theta, zeta, 0.0])
                 for (w, zeta), (q, theta) in zip(heave.initial, pitch.initial, strict=True)
             ]
             best.append((heave.cost, np.array(gains), initial))

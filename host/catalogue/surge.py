@@ -30,8 +30,9 @@ def _speed_loss(c: Chain) -> None:
 
 
 def _begins(c: Chain) -> ca.SX:
-    """At the measured speed, where it is corrected; else at that without any loss."""
-    return (c.speed - c.p["u0"]) * c.is_speed_known if "speed_gain" in c.p else 0 * c.zeta
+    """At the measured speed, where it is corrected; where none is measured, off that of steady flight."""
+    found = c.p["u0"] * c.excess * (1 - c.is_speed_known)
+    return found + (c.speed - c.p["u0"]) * c.is_speed_known if "speed_gain" in c.p else found
 
 
 EFFECTS = (

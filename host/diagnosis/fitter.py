@@ -224,7 +224,7 @@ class Fitter:
             if name in structure.names:
                 values[structure.names.index(name)] = value
         initial = [
-            np.array([0.0, 0.0, first_known(recording.pitch), first_known(recording.depth)])
+            np.array([0.0, 0.0, first_known(recording.pitch), first_known(recording.depth), 0.0])
             for recording in self.recordings
         ]
         return Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0]))

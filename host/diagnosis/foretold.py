@@ -24,7 +24,7 @@ def foretold_errors(explanation: Explanation, recording: Recording, horizon: flo
     """
     fit, time = explanation.fit, recording.time
     inputs = inputs_of(recording, fit.structure)
-    initial = np.array([0.0, 0.0, first_known(recording.pitch), first_known(recording.depth)])
+    initial = np.array([0.0, 0.0, first_known(recording.pitch), first_known(recording.depth), 0.0])
     followed = following(fit, initial, inputs)
     outputs = np.full((2, time.size), np.nan)
     number = np.floor((time - time[0] - SETTLING_SPAN) / horizon)
@@ -39,7 +39,7 @@ def foretold_errors(explanation: Explanation, recording: Recording, horizon: flo
 
 
 def following(fit: Fit, initial: Array, inputs: Inputs) -> Array:
-    """Gains (2 nx, N) of a Kalman filter that begins near this state (4,), under the fit's random forces."""
+    """Gains (2 nx, N) of a Kalman filter that begins near this state (5,), under the fit's random forces."""
     spread = np.zeros(len(fit.structure.states))
-    spread[: initial.size] = np.square(FIRST_SPREAD)
+    spread[: len(FIRST_SPREAD)] = np.square(FIRST_SPREAD)
     return kalman_pass(fit.parameters, initial, fit.noise, inputs, spread).gains

@@ -81,7 +81,7 @@ def _as_it_is(model: VehicleModel, recordings: list[Recording]) -> Explanation:
     structure, values = model.structure, model.parameters
     nothing = np.zeros(values.size, dtype=bool)
     initial = [
-        np.array([0.0, 0.0, *(values[np.isfinite(values)][0] for values in (r.pitch, r.depth))])
+        np.array([0.0, 0.0, *(values[np.isfinite(values)][0] for values in (r.pitch, r.depth)), 0.0])
         for r in recordings
     ]
     start = Point(structure, values, initial, np.zeros(4))

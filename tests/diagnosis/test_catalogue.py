@@ -24,6 +24,7 @@ NAMES_OF_THE_FORMAT = {
 }  # fmt: skip
 SCALES = {"": 1.0, "speed": 2.5, "rudder": 0.25, "duration": 30.0, "depth": 20.0}
 START = np.array([0.05, 0.02, 0.03, 20.0])
+SLOW = np.append(START, -0.2)  # not yet at the speed of steady flight
 
 
 def probe_of(name: str) -> np.ndarray:  # type: ignore[type-arg]
@@ -49,14 +50,17 @@ def test_effects_act_and_their_sensitivities_are_exact(names: tuple[str, ...]) -
     inputs = inputs_of(recording, structure)
     probes = [probe_of(effect.name) for effect in structure.effects]
     values = np.concatenate([[*BASE.values(), 0.0, 0.0], *probes])
-    run = free_run(values, START, inputs).outputs
-    plain = free_run(values[:8], START, inputs_of(recording)).outputs
+    run = free_run(values, SLOW, inputs).outputs
+    plain = free_run(values[:8], SLOW, inputs_of(recording)).outputs
     assert np.abs(run - plain).max() > 1e-5
-    _, sensitivity = innovations(values, START, inputs)
-    for index in range(values.size):
-        change = np.zeros(values.size)
-        change[index] = 1e-6 * max(1.0, abs(values[index]))
-        ends = [free_run(values + sign * change, START, inputs).outputs for sign in (1.0, -1.0)]
+    _, sensitivity = innovations(values, SLOW, inputs)
+    point = np.concatenate([values, SLOW])
+    for index in range(point.size):
+        change = np.zeros(point.size)
+        change[index] = 1e-6 * max(1.0, abs(point[index]))
+        ends = [
+            free_run(*np.split(point + sign * change, [values.size]), inputs).outputs for sign in (1.0, -1.0)
+        ]
         slope = (ends[0] - ends[1]) / (2.0 * change[index])
         assert np.allclose(sensitivity[:, index], slope, atol=2e-4 * max(np.abs(slope).max(), 1e-6))
 

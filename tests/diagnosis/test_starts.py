@@ -27,7 +27,7 @@ from host.valleys import (
     with_stall_moved,
 )
 
-AT_REST = np.array([0.0, 0.0, 0.0, 20.0])
+AT_REST = np.array([0.0, 0.0, 0.0, 20.0, 0.0])
 WEAKENED_AT = 31.3  # under a large plane angle, so that the recording can tell
 
 

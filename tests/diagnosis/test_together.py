@@ -20,7 +20,7 @@ from host.output_error import output_error
 from host.propagate import free_run, inputs_of
 from host.valleys import with_poles_swapped
 
-AT_REST = np.array([0.0, 0.0, 0.0, 20.0])
+AT_REST = np.array([0.0, 0.0, 0.0, 20.0, 0.0])
 
 
 class Rounds:

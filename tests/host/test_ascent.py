@@ -36,7 +36,7 @@ def unstable(factor: float) -> tuple[RandomForces, Point]:
     recording = hidden_dive(beside_the_base, duration=60.0)
     values = np.array([factor * HULL.get(name, 0.0) for name in STRUCTURE.names])
     values[STRUCTURE.names.index("u0")] = HULL["u0"]
-    start = [np.array([0.0, 0.0, 0.0, 20.0])]
+    start = [np.array([0.0, 0.0, 0.0, 20.0, 0.0])]
     return RandomForces([inputs_of(recording, STRUCTURE)]), Point(STRUCTURE, values, start, NOISE)
 
 

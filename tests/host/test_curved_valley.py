@@ -49,7 +49,7 @@ def start_and_recording() -> tuple[Point, Recording]:
     )  # fmt: skip
     values = {**TRUTH, **NEAR_THE_OTHER_END, "lag_time": 0.08}
     parameters = np.array([values.get(name, 0.0) for name in structure.names])
-    initial = [np.array([0.0, 0.0, outputs[0, 0], outputs[1, 0]])]
+    initial = [np.array([0.0, 0.0, outputs[0, 0], outputs[1, 0], 0.0])]
     return Point(structure, parameters, initial, np.array([4e-6, 8e-5, 0.0, 0.0])), recording
 
 

@@ -18,7 +18,7 @@ DRAG, SHARE = NAMES.index("c_ww"), NAMES.index("kinematics_share")
 def linear_problem(seed: int, drag: float, share: float) -> tuple[GaussNewton, np.ndarray, np.ndarray]:  # type: ignore[type-arg]
     """Normal equations of white innovations e = S d, with their sensitivities to the free parameters."""
     rng = np.random.default_rng(seed)
-    scores = np.zeros((2, len(NAMES) + 4, 200))
+    scores = np.zeros((2, len(NAMES) + 5, 200))
     scores[:, : len(NAMES)][:, FREE] = rng.standard_normal((2, 3, 200)) + 0.5 * rng.standard_normal(
         (2, 1, 200)
     )
@@ -28,7 +28,7 @@ def linear_problem(seed: int, drag: float, share: float) -> tuple[GaussNewton, n
     values = np.zeros(len(NAMES))
     values[NAMES.index("a1")], values[NAMES.index("a2")] = -1.0, -1.0
     values[NAMES.index("u0")], values[DRAG], values[SHARE] = 2.0, drag, share
-    point = Point(STRUCTURE, values, [np.zeros(4)], np.array([1.0, 1.0, 0.0, 0.0]))
+    point = Point(STRUCTURE, values, [np.zeros(5)], np.array([1.0, 1.0, 0.0, 0.0]))
     return GaussNewton([(error, scores)], point, FREE), S.T, error.ravel()
 
 
@@ -66,7 +66,7 @@ def test_the_others_make_up_for_what_stops_at_its_bound() -> None:
 
 def test_where_the_slopes_leave_the_numbers_nothing_is_promised_and_no_step_taken() -> None:
     step, S, _ = linear_problem(3, drag=-1.0, share=1.0)
-    lost = step.with_normal([(np.full((S.shape[1] + 4,) * 2, np.inf), np.zeros(S.shape[1] + 4))])
+    lost = step.with_normal([(np.full((S.shape[1] + 5,) * 2, np.inf), np.zeros(S.shape[1] + 5))])
     assert lost.promise() == 0.0
     assert lost.trial(1.0) is lost.point
 
@@ -77,14 +77,14 @@ def test_what_stops_early_on_a_ridge_hides_no_gain() -> None:
     values = np.zeros(len(NAMES))
     values[NAMES.index("a1")], values[NAMES.index("a2")] = -1.0, -1.0
     values[NAMES.index("u0")], values[DRAG], values[SHARE] = 2.0, -1.0, 1.0
-    scores = np.zeros((2, len(NAMES) + 4, 200))
+    scores = np.zeros((2, len(NAMES) + 5, 200))
     common = rng.standard_normal((2, 200))
     scores[:, NAMES.index("u0")] = common
     scores[:, DRAG] = common + 1e-4 * rng.standard_normal((2, 200))
     scores[:, SHARE] = rng.standard_normal((2, 200))
     error = 0.8 * scores[:, SHARE] + 0.1 * rng.standard_normal((2, 200))
     error += 3e3 * (scores[:, DRAG] - scores[:, NAMES.index("u0")]) + 0.5 * common
-    point = Point(STRUCTURE, values, [np.zeros(4)], np.array([1.0, 1.0, 0.0, 0.0]))
+    point = Point(STRUCTURE, values, [np.zeros(5)], np.array([1.0, 1.0, 0.0, 0.0]))
     step, cost = GaussNewton([(error, scores)], point, FREE), float(np.sum(error**2))
     assert step.promise() < 0.0
     assert step.predicted_cost(cost) < 0.8 * cost

@@ -98,7 +98,7 @@ def test_a_start_that_runs_away_from_rounded_readings_is_given_up() -> None:
     inputs = [inputs_of(read, steps=resolution([read]))]
     assert inputs[0].steps[1] == pytest.approx(STEP)
     wild = np.array([0.5, 20.0, 200.0, 0.1, 5.0, 1.0, 0.0, 0.0])
-    start = Point(BASE, wild, [np.array([0.0, 0.0, 0.1, 10.0])], np.zeros(4))
+    start = Point(BASE, wild, [np.array([0.0, 0.0, 0.1, 10.0, 0.0])], np.zeros(4))
     lost = output_error(start, inputs, np.ones(wild.size, dtype=bool))
     assert lost.log_likelihood == -np.inf
     assert free_run_cost(start, inputs) > 1e5

@@ -144,7 +144,7 @@ def test_waves_are_found_with_their_frequency_and_bias_nothing() -> None:
     assert again.log_likelihood == pytest.approx(fit.log_likelihood, abs=0.1)
     white, sensitivity = whitened_in_waves(here, inputs)[0]
     np.testing.assert_allclose(white, np.nan_to_num(fit.whitened[0]), atol=1e-9)
-    assert sensitivity.shape == (2, fit.parameters.size + 4, recording.time.size)
+    assert sensitivity.shape == (2, fit.parameters.size + 5, recording.time.size)
     # So they are by its own gains, handed in; and by those of other waves they are not.
     own, states = passes_in_waves(here, inputs), fit.structure.states
     by_gains, slopes = whitened_in_waves(here, inputs, own, states)[0]

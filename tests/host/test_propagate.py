@@ -41,14 +41,13 @@ def test_free_run_follows_a_speed_that_changes_from_row_to_row() -> None:
 def test_sensitivities_equal_finite_differences() -> None:
     recording, states = fly(Dive(duration=30.0))
     inputs = inputs_of(recording)
-    _, sensitivity = innovations(TRUTH, states[:, 0], inputs)
-    for index in range(TRUTH.size + 4):
-        change = np.zeros(TRUTH.size + 4)
+    start = np.append(states[:, 0], 0.0)
+    _, sensitivity = innovations(TRUTH, start, inputs)
+    for index in range(TRUTH.size + 5):
+        change = np.zeros(TRUTH.size + 5)
         change[index] = 1e-6
         moved = [
-            free_run(
-                TRUTH + s * change[: TRUTH.size], states[:, 0] + s * change[TRUTH.size :], inputs
-            ).outputs
+            free_run(TRUTH + s * change[: TRUTH.size], start + s * change[TRUTH.size :], inputs).outputs
             for s in (1.0, -1.0)
         ]
         slope = (moved[0] - moved[1]) / 2e-6
