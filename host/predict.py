@@ -8,7 +8,7 @@ from host.errors import RecordingError
 from host.model import VehicleModel
 from host.outliers import without_outliers
 from host.plane_between_rows import with_moving_plane
-from host.propagate import Inputs, free_run, inputs_of
+from host.propagate import Inputs, begun_at, free_run, inputs_of
 from host.recording import Array, Recording
 from host.sensitivities import innovations
 
@@ -83,7 +83,7 @@ def estimate_initial_state(parameters: Array, opening: Recording, whole: Inputs)
             f"{opening.name}: no {lacking} in the first {SETTLING_SPAN:g} s, from which the free run starts"
         )
     first = [float(inputs.measured[i, inputs.present[i] > 0.0][0]) for i in range(2)]
-    centre = np.array([0.0, 0.0, first[0], first[1], 0.0])
+    centre = begun_at(*first)
     prior = np.diag(np.array([0.5, 0.5, 0.2, 2.0, 0.1]) ** -2.0)
     weight = np.array([np.deg2rad(0.1), 0.01]) ** -2.0
     x = centre.copy()

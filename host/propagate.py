@@ -231,6 +231,11 @@ def form_of(inputs: Inputs) -> Form:
     return Form(inputs.evaluated, inputs.substeps, inputs.drive.shape[0])
 
 
+def begun_at(pitch: float, depth: float) -> Array:
+    """What a run begins with at this pitch, rad, and depth, m, in steady flight (5,)."""
+    return np.array([0.0, 0.0, pitch, depth, 0.0])
+
+
 def start_of(form: Form, parameters: Array, initial: Array, inputs: Inputs) -> tuple[Array, Array]:
     """All states at the first row (nx,), and their derivatives by the parameters and by `initial` (5,)."""
     begun = np.zeros(NX0)

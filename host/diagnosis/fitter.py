@@ -25,7 +25,7 @@ from host.gauss_newton import Mask, Point
 from host.maximum_likelihood import fit_maximum_likelihood
 from host.noise_floor import noise_floor, resolution
 from host.output_error import annealed, free_run_cost, output_error
-from host.propagate import LONGEST_SUBSTEP, Inputs, inputs_of, longest_substep
+from host.propagate import LONGEST_SUBSTEP, Inputs, begun_at, inputs_of, longest_substep
 from host.recording import Array, Recording, mean_speed
 from host.rounding import NO_STEPS, thinned
 from host.speed_error import speed_errors
@@ -224,7 +224,7 @@ class Fitter:
             if name in structure.names:
                 values[structure.names.index(name)] = value
         initial = [
-            np.array([0.0, 0.0, first_known(recording.pitch), first_known(recording.depth), 0.0])
+            begun_at(first_known(recording.pitch), first_known(recording.depth))
             for recording in self.recordings
         ]
         return Point(structure, values, initial, np.array([*self.floor, 0.0, 0.0]))

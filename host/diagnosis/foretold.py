@@ -9,7 +9,7 @@ from host.diagnosis.fitter import first_known
 from host.fit import Fit
 from host.kalman import kalman_pass
 from host.predict import SETTLING_SPAN
-from host.propagate import Inputs, inputs_of
+from host.propagate import Inputs, begun_at, inputs_of
 from host.recording import Array, Recording
 from host.sensitivities import steered_run
 
@@ -24,7 +24,7 @@ def foretold_errors(explanation: Explanation, recording: Recording, horizon: flo
     """
     fit, time = explanation.fit, recording.time
     inputs = inputs_of(recording, fit.structure)
-    initial = np.array([0.0, 0.0, first_known(recording.pitch), first_known(recording.depth), 0.0])
+    initial = begun_at(first_known(recording.pitch), first_known(recording.depth))
     followed = following(fit, initial, inputs)
     outputs = np.full((2, time.size), np.nan)
     number = np.floor((time - time[0] - SETTLING_SPAN) / horizon)

@@ -19,7 +19,7 @@ from host.equations import NAMES, Slot
 from host.gauss_newton import Point
 from host.model import VehicleModel
 from host.output_error import output_error
-from host.propagate import inputs_of
+from host.propagate import begun_at, inputs_of
 from host.recording import Array, Recording
 
 TRIMS = {"heave_offset": ("net_buoyancy", "c_w0"), "pitch_offset": ("trim_moment", "c_q0")}
@@ -81,8 +81,7 @@ def _as_it_is(model: VehicleModel, recordings: list[Recording]) -> Explanation:
     structure, values = model.structure, model.parameters
     nothing = np.zeros(values.size, dtype=bool)
     initial = [
-        np.array([0.0, 0.0, *(values[np.isfinite(values)][0] for values in (r.pitch, r.depth)), 0.0])
-        for r in recordings
+        begun_at(*(values[np.isfinite(values)][0] for values in (r.pitch, r.depth))) for r in recordings
     ]
     start = Point(structure, values, initial, np.zeros(4))
     inputs = [inputs_of(recording, structure) for recording in recordings]

@@ -23,7 +23,7 @@ from host.equations import NAMES, Effect, Slot
 from host.filter_error import whitened_innovations
 from host.gauss_newton import GaussNewton, Point
 from host.output_error import residuals_at
-from host.propagate import LONGEST_SUBSTEP, Inputs, free_run, inputs_of
+from host.propagate import LONGEST_SUBSTEP, Inputs, begun_at, free_run, inputs_of
 from host.recording import Array, Recording, mean_speed
 
 SEPARATES = 2.0 * TWIN_MARGIN  # predicted chi2 that leaves no doubt after chance had its share
@@ -187,10 +187,10 @@ class _Flight:
         self.inputs = inputs_of(self.recording, named.fit.structure, LONGEST_SUBSTEP)
         fit = named.fit
         with np.errstate(over="ignore", invalid="ignore"):
-            outputs = free_run(fit.parameters, np.array([0.0, 0.0, 0.0, depth]), self.inputs).outputs
+            outputs = free_run(fit.parameters, begun_at(0.0, depth), self.inputs).outputs
             # Deep enough to stay in the water.
             self.depth = depth + max(0.0, float(np.nanmin(longest.depth)) - float(np.min(outputs[1])))
-            start = np.array([0.0, 0.0, 0.0, self.depth])
+            start = begun_at(0.0, self.depth)
             self.outputs = free_run(fit.parameters, start, self.inputs).outputs
         self._point = Point(rival.fit.structure, rival.fit.parameters, [start], fit.noise)
         self.predicted, self.with_speed = float("nan"), float("nan")
