@@ -1,4 +1,4 @@
-"""A recording that begins before the vehicle has come to its speed, which nothing measures."""
+"""A stretch of a recording that begins before the vehicle is back at its speed, which nothing measures."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def slow_dive(begins_at: float) -> Recording:
         x = solve_ivp(rate, (0.0, 0.1), x, args=(plane,), rtol=1e-8, atol=1e-10).y[:, -1]
     blank = np.full(rudder.size, np.nan)
     return Recording(
-        name="slow", sha256="0" * 64, step=0.1, time=0.1 * np.arange(rudder.size), rudder=rudder,
+        name="slow", sha256="0" * 64, step=0.1, time=200.0 + 0.1 * np.arange(rudder.size), rudder=rudder,
         speed=blank, pitch_rate=blank,
         pitch=states[2] + PITCH_NOISE * rng.standard_normal(rudder.size),
         depth=states[3] + DEPTH_NOISE * rng.standard_normal(rudder.size),

@@ -35,7 +35,7 @@ def flown(speed_noise: float) -> tuple[Fitter, Explanation]:
     rows = replace(rows, speed=speed)
     structure = structure_of(NAMES | {"speed_loss"})
     known = dict.fromkeys(structure.names, 0.0) | {"speed_time": 1.0} | HULL
-    values, start = np.array([known[name] for name in structure.names]), np.array([0.0, 0.0, 0.0, 20.0])
+    values, start = np.array([known[name] for name in structure.names]), np.array([0.0, 0.0, 0.0, 20.0, 0.0])
     inputs = inputs_of(rows, structure)
     inputs.drive[1] = speed  # as it was, not smoothed
     run = free_run(values, start, inputs)
