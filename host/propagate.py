@@ -238,9 +238,7 @@ def begun_at(pitch: float, depth: float) -> Array:
 
 def start_of(form: Form, parameters: Array, initial: Array, inputs: Inputs) -> tuple[Array, Array]:
     """All states at the first row (nx,), and their derivatives by the parameters and by `initial` (5,)."""
-    begun = np.zeros(NX0)
-    begun[: initial.size] = initial  # at the speed of steady flight, where it is not said
-    x, slopes = _initial(form)(begun, inputs.widened(parameters), inputs.drive[:, 0])
+    x, slopes = _initial(form)(initial, inputs.widened(parameters), inputs.drive[:, 0])
     columns = [*inputs.own, *range(form.np, form.np + NX0)]
     return np.asarray(x, dtype=float).ravel(), np.asarray(slopes, dtype=float)[:, columns]
 

@@ -10,7 +10,7 @@ from host.model import VehicleModel
 from host.outliers import without_outliers
 from host.plane_between_rows import with_moving_plane
 from host.predict import SETTLING_SPAN, estimate_initial_state
-from host.propagate import NX0, Run, free_run, inputs_of
+from host.propagate import Run, begun_at, free_run, inputs_of
 from host.recording import Array, Recording
 from host.speed import smoothed_speed
 
@@ -39,7 +39,7 @@ def simulate(model: VehicleModel, recording: Recording) -> Simulation:
     if np.isfinite(opening.depth).any() and np.isfinite(opening.pitch).any():
         initial = estimate_initial_state(model.parameters, opening, inputs)
     else:
-        initial = np.zeros(NX0)
+        initial = begun_at(0.0, 0.0)
     rows = recording.time.size
     speed = smoothed_speed(cleaned.speed).speed if cleaned.has_speed else np.full(rows, model.values["u0"])
     return Simulation(

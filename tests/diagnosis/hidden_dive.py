@@ -1,6 +1,8 @@
 """Recordings that hide one effect, integrated by scipy: nothing of the catalogue or of its integrator."""
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -8,6 +10,7 @@ from scipy.integrate import solve_ivp
 from host.recording import Array, Recording
 
 BASE = {"a1": -0.63084, "a2": -3.38699, "a3": -8.19858, "b1": 0.41385, "b2": -3.94120, "u0": 2.5}
+RECOVERY, DRAG = 4.0, 8.0  # of the speed, s, and of the plane, m/s^2/rad^2
 Extra = Callable[[float, Array, float], tuple[float, float, float]]
 
 
@@ -55,4 +58,32 @@ def hidden_dive(
         speed=nan,
         pitch_rate=nan,
         step=h,
+    )
+
+
+@cache
+def slowing(noise: float, begins_at: float = BASE["u0"]) -> Recording:
+    """A hull that the plane slows, its speed told with so much noise, m/s, from that at which it begins."""
+    plain, rng = hidden_dive(duration=120.0), np.random.default_rng(5)
+    x, states = np.array([0.0, 0.0, 0.0, 20.0, begins_at]), np.empty((5, plain.time.size))
+    for k, plane in enumerate(plain.rudder.tolist()):
+        states[:, k] = x
+
+        def rate(_: float, x: Array, plane: float = plane) -> list[float]:
+            w, q, theta, _, u = x
+            ratio = u / BASE["u0"]
+            return [
+                BASE["a1"] * ratio * w + BASE["b1"] * ratio**2 * plane,
+                BASE["a2"] * ratio * q + BASE["a3"] * theta + BASE["b2"] * ratio**2 * plane,
+                q,
+                w - u * theta,
+                BASE["u0"] * (1.0 - ratio**2) / (2.0 * RECOVERY) - DRAG * (ratio * plane) ** 2,
+            ]
+
+        x = solve_ivp(rate, (0.0, plain.step), x, rtol=1e-8, atol=1e-10).y[:, -1]
+    return replace(
+        plain,
+        depth=states[3] + 0.01 * rng.standard_normal(plain.time.size),
+        pitch=states[2] + np.deg2rad(0.1) * rng.standard_normal(plain.time.size),
+        speed=states[4] + noise * rng.standard_normal(plain.time.size),
     )

@@ -23,8 +23,8 @@ NAMES_OF_THE_FORMAT = {
     "pitch_sensor_lag", "vertical_current", "internal_wave", "surface_waves",
 }  # fmt: skip
 SCALES = {"": 1.0, "speed": 2.5, "rudder": 0.25, "duration": 30.0, "depth": 20.0}
-START = np.array([0.05, 0.02, 0.03, 20.0])
-SLOW = np.append(START, -0.2)  # not yet at the speed of steady flight
+START = np.array([0.05, 0.02, 0.03, 20.0, 0.0])
+SLOW = np.array([*START[:4], -0.2])  # not yet at the speed of steady flight
 
 
 def probe_of(name: str) -> np.ndarray:  # type: ignore[type-arg]
@@ -45,7 +45,8 @@ WITH_WHAT_THEY_CHANGE = [(*effect.changes, name) for name, effect in sorted(BY_N
 
 @pytest.mark.parametrize("names", [*WITH_WHAT_THEY_CHANGE, *PAIRS], ids="+".join)
 def test_effects_act_and_their_sensitivities_are_exact(names: tuple[str, ...]) -> None:
-    recording = hidden_dive(duration=30.0)
+    dive = hidden_dive(duration=30.0)
+    recording = replace(dive, time=1.0 + dive.time)  # a stretch, as only within a recording the speed is free
     structure = structure_of(names)
     inputs = inputs_of(recording, structure)
     probes = [probe_of(effect.name) for effect in structure.effects]
@@ -176,7 +177,9 @@ def test_a_low_centre_of_gravity_feels_a_change_of_speed() -> None:
     still = hidden_dive(duration=30.0)
     ramp = replace(still, rudder=np.zeros(still.time.size), speed=2.0 + 0.05 * still.time)
     inputs = inputs_of(ramp, structure_of(("surge_pitch_coupling",)))
-    run = free_run(np.array([*BASE.values(), 0.0, 0.0, 1.0, 0.0]), np.array([0.0, 0.0, 0.0, 20.0]), inputs)
+    run = free_run(
+        np.array([*BASE.values(), 0.0, 0.0, 1.0, 0.0]), np.array([0.0, 0.0, 0.0, 20.0, 0.0]), inputs
+    )
     settled = run.outputs[0, 150:250]
     np.testing.assert_allclose(settled, -0.05 / 9.80665, rtol=0.02)
 
@@ -256,7 +259,7 @@ def test_a_low_centre_of_gravity_pulls_at_the_hull_as_it_swings() -> None:
     run = free_run(
         np.array([values[name] for name in structure.names]), START, inputs_of(recording, structure, 0.025)
     )
-    x, outputs = np.array([*START, 0.0]), []
+    x, outputs = np.array([*START[:4], 0.0]), []
     for rudder in recording.rudder:
         outputs.append(x[2:4])
 
@@ -378,7 +381,7 @@ def test_the_plane_before_the_recording_is_where_delay_servo_and_play_begin(name
     rows, lead = hidden_dive(duration=30.0), 20
     known = BASE | {"delay": 0.25, "plane_rate": 0.5, "lag_time": 0.4, "backlash": 0.04, "plane_before": 0.0}
     known |= {"heave_offset": 0.0, "pitch_offset": 0.0}
-    at_rest = np.array([0.0, 0.0, 0.0, 20.0])
+    at_rest = np.array([0.0, 0.0, 0.0, 20.0, 0.0])
 
     def run(rows: Recording, *more: str) -> np.ndarray:  # type: ignore[type-arg]
         structure = structure_of((*names, *more))

@@ -169,7 +169,9 @@ def test_a_change_of_no_size_leaves_the_speed_that_is_lost_as_it_is(change: str)
         structure = structure_of(names)
         known = {**BASE, "speed_time": 5.0, "c_ud": 2.0, "c_uq": 1.0, "speed_change_time": 10.0, LAST: 30.0}
         parameters = np.array([known.get(name, 0.0) for name in structure.names])
-        runs.append(free_run(parameters, np.array([0.0, 0.0, 0.0, 20.0]), inputs_of(dive, structure)).outputs)
+        runs.append(
+            free_run(parameters, np.array([0.0, 0.0, 0.0, 20.0, 0.0]), inputs_of(dive, structure)).outputs
+        )
     np.testing.assert_array_equal(*runs)
 
 
@@ -187,7 +189,7 @@ def test_a_change_at_a_tried_moment_is_that_change(name: str) -> None:
     def run(effects: tuple[str, ...], values: dict[str, float]) -> Array:
         structure = structure_of(effects)
         parameters = np.array([(known | values).get(p, 0.0) for p in structure.names])
-        return free_run(parameters, np.array([0.0, 0.0, 0.0, 20.0]), inputs_of(dive, structure)).outputs
+        return free_run(parameters, np.array([0.0, 0.0, 0.0, 20.0, 0.0]), inputs_of(dive, structure)).outputs
 
     nothing = run(beside, {})
     one, other = run((*beside, SCANS[name].name), tried), run((*beside, name), alone)
@@ -205,7 +207,9 @@ def test_a_low_centre_of_gravity_feels_how_quickly_the_speed_changes() -> None:
         known = {**BASE, "speed_step": -0.2, "speed_change_time": 10.0, "speed_settling": settling}
         known |= {"pendulum_share": 1.0}
         parameters = np.array([known.get(name, 0.0) for name in structure.names])
-        pitch, _ = free_run(parameters, np.array([0.0, 0.0, 0.0, 20.0]), inputs_of(dive, structure)).outputs
+        pitch, _ = free_run(
+            parameters, np.array([0.0, 0.0, 0.0, 20.0, 0.0]), inputs_of(dive, structure)
+        ).outputs
         runs.append(pitch)
         assert np.abs(pitch[dive.time < 9.5]).max() < 1e-6
     at_once, soon, hardly = (float(np.abs(pitch).max()) for pitch in runs)
@@ -244,7 +248,9 @@ def test_water_that_moves_is_entered_or_carries_along(
         structure = structure_of(tuple(effects))
         known = BASE | {name: value for values in effects.values() for name, value in values.items()}
         parameters = np.array([known.get(name, 0.0) for name in structure.names])
-        runs.append(free_run(parameters, np.array([0.0, 0.0, 0.0, 20.0]), inputs_of(dive, structure)).outputs)
+        runs.append(
+            free_run(parameters, np.array([0.0, 0.0, 0.0, 20.0, 0.0]), inputs_of(dive, structure)).outputs
+        )
     np.testing.assert_allclose(*runs, atol=1e-9)
 
 

@@ -60,7 +60,7 @@ def test_damping_that_stays_needs_a_speed_that_changes() -> None:
     dive = replace(hidden_dive(duration=30.0), speed=np.full(300, BASE["u0"]))
     values = np.array([*BASE.values(), 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0])
     structure = structure_of(("speed_loss", "speed_independent_damping"))
-    start = np.array([0.1, 0.0, 0.05, 20.0])
+    start = np.array([0.1, 0.0, 0.05, 20.0, 0.0])
     run = free_run(values, start, inputs_of(dive, structure)).outputs
     plain = free_run(values[:8], start, inputs_of(dive)).outputs
     np.testing.assert_allclose(run, plain, atol=1e-9)

@@ -61,7 +61,7 @@ def test_a_weight_pushes_less_across_a_hull_that_stands_on_its_nose() -> None:
     # Held at its pitch, and without damping: all that moves it is the weight.
     values = np.array([*{**BASE, "a1": -1e-9, "a2": -1e-9, "a3": -1e-9, "u0": 1e-6}.values(), 0.0, 0.0, 0.05])
     for pitch in (0.0, 1.0):
-        start = np.array([0.0, 0.0, pitch, 20.0])
+        start = np.array([0.0, 0.0, pitch, 20.0, 0.0])
         depth = free_run(values, start, inputs_of(still, structure)).outputs[1]
         expected = 20.0 + 0.5 * 0.05 * np.cos(pitch) * still.time**2
         np.testing.assert_allclose(depth, expected, atol=1e-5)

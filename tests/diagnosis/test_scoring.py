@@ -38,7 +38,7 @@ def test_among_random_forces_a_lost_speed_arrives_where_it_is_judged() -> None:
     known = {"a1": -0.6, "a2": -1.5, "a3": -1.0, "b1": 0.3, "b2": -0.8, "u0": 2.0}
     known |= {"speed_time": 60.0, "c_ud": 3.0, "c_uq": 0.0}
     values = np.array([known.get(name, 0.0) for name in structure.names])
-    start = np.array([0.0, 0.0, 0.0, 20.0])
+    start = np.array([0.0, 0.0, 0.0, 20.0, 0.0])
     run = free_run(values, start, inputs_of(rows, structure))
     assert run.states[structure.states.index("speed_loss")].min() < -0.5
     noise = np.array([[2e-3], [1e-2]]) * rng.standard_normal(run.outputs.shape)

@@ -36,7 +36,7 @@ def flown(values: dict[str, float], names: Names, seed: int = 3) -> Recording:
     """A dive of the catalogue's own equations: only the search is under test."""
     rows, structure = hidden_dive(duration=120.0), structure_of(names)
     known = dict.fromkeys(structure.names, 0.0) | BASE | values
-    start = np.array([0.0, 0.0, 0.0, 20.0])
+    start = np.array([0.0, 0.0, 0.0, 20.0, 0.0])
     run = free_run(np.array([known[name] for name in structure.names]), start, inputs_of(rows, structure))
     noisy = run.outputs + NOISE * np.random.default_rng(seed).standard_normal(run.outputs.shape)
     return replace(rows, pitch=noisy[0], depth=noisy[1])

@@ -1,12 +1,10 @@
 """A measured speed that errs, corrected by the surge equation."""
 
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from host.catalogue import structure_of
 from host.catalogue.nuisance import SPEED_CORRECTION
@@ -19,40 +17,11 @@ from host.diagnosis.given_model import against_model
 from host.diagnosis.unknown_physics import known_in
 from host.model import read_model
 from host.propagate import free_run, inputs_of
-from host.recording import Array, Recording
+from host.recording import Array
 from host.vehicle import default_vehicle
-from tests.diagnosis.hidden_dive import BASE, hidden_dive
+from tests.diagnosis.hidden_dive import BASE, DRAG, RECOVERY, slowing
 
-RECOVERY, DRAG = 4.0, 8.0  # s, m/s^2/rad^2
 CORRECTED = frozenset({"speed_loss", SPEED_CORRECTION.name})
-
-
-@cache
-def slowing(noise: float) -> Recording:
-    """A hull that the plane slows, its speed told with so much noise, m/s."""
-    plain, rng = hidden_dive(duration=120.0), np.random.default_rng(5)
-    x, states = np.array([0.0, 0.0, 0.0, 20.0, BASE["u0"]]), np.empty((5, plain.time.size))
-    for k, plane in enumerate(plain.rudder.tolist()):
-        states[:, k] = x
-
-        def rate(_: float, x: Array, plane: float = plane) -> list[float]:
-            w, q, theta, _, u = x
-            ratio = u / BASE["u0"]
-            return [
-                BASE["a1"] * ratio * w + BASE["b1"] * ratio**2 * plane,
-                BASE["a2"] * ratio * q + BASE["a3"] * theta + BASE["b2"] * ratio**2 * plane,
-                q,
-                w - u * theta,
-                BASE["u0"] * (1.0 - ratio**2) / (2.0 * RECOVERY) - DRAG * (ratio * plane) ** 2,
-            ]
-
-        x = solve_ivp(rate, (0.0, plain.step), x, rtol=1e-8, atol=1e-10).y[:, -1]
-    return replace(
-        plain,
-        depth=states[3] + 0.01 * rng.standard_normal(plain.time.size),
-        pitch=states[2] + np.deg2rad(0.1) * rng.standard_normal(plain.time.size),
-        speed=states[4] + noise * rng.standard_normal(plain.time.size),
-    )
 
 
 @cache
@@ -129,7 +98,7 @@ def speeds(gain: float, rates: dict[str, float] | None = None) -> Array:
         | {"speed_gain": gain, "balanced_share": 1.0}
         | (rates or {})
     )
-    start = np.array([0.0, 0.0, 0.0, 20.0])
+    start = np.array([0.0, 0.0, 0.0, 20.0, 0.0])
     run = free_run(np.array([known[n] for n in structure.names]), start, inputs_of(recording, structure))
     return np.asarray(BASE["u0"] + run.states[structure.states.index("speed_loss")])
 

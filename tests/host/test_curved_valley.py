@@ -41,7 +41,7 @@ def start_and_recording() -> tuple[Point, Recording]:
         pitch=np.zeros(rows), rudder=rudder, speed=np.full(rows, 3.2), pitch_rate=nan, step=step,
     )  # fmt: skip
     truth = np.array([TRUTH.get(name, 0.0) for name in structure.names])
-    outputs = free_run(truth, np.array([0.0, 0.0, 0.0, 20.0]), inputs_of(blank, structure)).outputs
+    outputs = free_run(truth, np.array([0.0, 0.0, 0.0, 20.0, 0.0]), inputs_of(blank, structure)).outputs
     outputs += np.array([[2e-3], [9e-3]]) * rng.standard_normal(outputs.shape)
     recording = Recording(
         name="valley.csv", sha256="0" * 64, time=blank.time, depth=outputs[1], pitch=outputs[0],

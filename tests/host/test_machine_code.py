@@ -31,8 +31,13 @@ def passes() -> list[Array]:
     inputs = inputs_of(recording, Structure(tuple(bent)))
     middle = [0.5 * (each.lower + each.upper) for each in own]
     parameters = np.array([*TABLE_1.values(), 0.0, 0.0, *middle])
-    run = kalman_pass(parameters, states[:, 0], NOISE, inputs)
-    found = [run.error, run.variance, run.gains, free_run(parameters, states[:, 0], inputs).states]
+    run = kalman_pass(parameters, np.append(states[:, 0], 0.0), NOISE, inputs)
+    found = [
+        run.error,
+        run.variance,
+        run.gains,
+        free_run(parameters, np.append(states[:, 0], 0.0), inputs).states,
+    ]
     assert all(np.isfinite(one).all() for one in found)
     return found
 

@@ -32,12 +32,12 @@ def test_a_long_dive_of_a_vehicle_that_hardly_restores_itself_is_no_runaway() ->
     slow = (-0.02, -1e-3, -3e-5, 0.01, 1e-4, 0.3)
     recording, states = fly(Dive(vehicle=slow, step=4.0, duration=3000.0, amplitude=0.3))
     inputs = [inputs_of(recording)]
-    _, sensitivity = innovations(np.array([*slow, 0.0, 0.0]), states[:, 0], inputs[0])
+    _, sensitivity = innovations(np.array([*slow, 0.0, 0.0]), np.append(states[:, 0], 0.0), inputs[0])
     assert np.abs(sensitivity).max() > RUNAWAY
     assert not diverges([(np.zeros(0), sensitivity)], inputs)
     diverging = np.array([*slow, 0.0, 0.0])
     diverging[2] = 1e-3
-    _, sensitivity = innovations(diverging, states[:, 0], inputs[0])
+    _, sensitivity = innovations(diverging, np.append(states[:, 0], 0.0), inputs[0])
     assert diverges([(np.zeros(0), sensitivity)], inputs)
 
 

@@ -39,8 +39,10 @@ def test_likelihood_of_wandering_sensors_equals_dense_algebra_with_samples_missi
     recording, states = fly(Dive(duration=6.0, missing=0.3))
     inputs = inputs_of(recording)
     noise = np.array([3e-6, 1e-4, 2e-6, 9e-4, 0.4, 2.0])
-    here = place(Point(inputs.structure, TRUTH, [states[:, 0]], noise), WanderingSensors([inputs]))
-    residual = inputs.measured - free_run(TRUTH, states[:, 0], inputs).outputs
+    here = place(
+        Point(inputs.structure, TRUTH, [np.append(states[:, 0], 0.0)], noise), WanderingSensors([inputs])
+    )
+    residual = inputs.measured - free_run(TRUTH, np.append(states[:, 0], 0.0), inputs).outputs
     apart = np.abs(recording.time[:, None] - recording.time)
     dense = 0.0
     for i in range(2):
@@ -57,7 +59,9 @@ def test_a_trial_that_runs_away_among_wandering_sensors_is_refused() -> None:
     diverging = TRUTH.copy()
     diverging[1:3] = -1e-4, 5.0
     noise = np.array([3e-6, 1e-4, 2e-6, 9e-4, 0.4, 2.0])
-    there = place(Point(inputs.structure, diverging, [states[:, 0]], noise), WanderingSensors([inputs]))
+    there = place(
+        Point(inputs.structure, diverging, [np.append(states[:, 0], 0.0)], noise), WanderingSensors([inputs])
+    )
     assert there.likelihood == -np.inf
 
 
@@ -221,7 +225,7 @@ def test_a_noise_level_that_loses_the_recording_where_it_is_moved_stays() -> Non
             return [replace(run, variance=np.full_like(run.variance, np.inf)) for run in runs]
 
     model = Brittle([inputs])
-    here = place(Point(inputs.structure, TRUTH, [states[:, 0]], noise), model)
+    here = place(Point(inputs.structure, TRUTH, [np.append(states[:, 0], 0.0)], noise), model)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         moved = _Scoring(here, model).trial(1e-3)

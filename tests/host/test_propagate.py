@@ -12,7 +12,7 @@ TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 
 def test_free_run_equals_the_matrix_exponential() -> None:
     recording, states = fly(Dive(duration=60.0))
-    simulated = free_run(TRUTH, states[:, 0], inputs_of(recording)).states
+    simulated = free_run(TRUTH, np.append(states[:, 0], 0.0), inputs_of(recording)).states
     assert np.abs(simulated - states).max() < 2e-6
 
 
@@ -23,7 +23,7 @@ def test_a_slow_vehicle_needs_few_sub_steps_however_seldom_it_is_recorded(step: 
     truth = np.array([*slow, 0.0, 0.0])
     inputs = inputs_of(recording, longest_substep=longest_substep(truth, step))
     assert inputs.substeps == substeps
-    simulated = free_run(truth, states[:, 0], inputs).states
+    simulated = free_run(truth, np.append(states[:, 0], 0.0), inputs).states
     assert (np.abs(simulated - states).max(axis=1) < 1e-3 * np.ptp(states, axis=1)).all()
 
 
@@ -34,7 +34,7 @@ def test_free_run_follows_a_speed_that_changes_from_row_to_row() -> None:
     recording, states = fly(fine)
     kept = recording.rudder[::10], states[:, ::10], 2.5 + 0.5 * np.sin(time[::10] / 3.0)
     coarse, _ = fly(Dive(duration=40.0, rudder=kept[0], speed=kept[2]))
-    simulated = free_run(TRUTH, states[:, 0], inputs_of(coarse)).states
+    simulated = free_run(TRUTH, np.append(states[:, 0], 0.0), inputs_of(coarse)).states
     assert np.abs(simulated - kept[1]).max() < 2e-4
 
 
@@ -57,8 +57,8 @@ def test_sensitivities_equal_finite_differences() -> None:
 def test_kalman_filter_without_process_noise_is_the_free_run() -> None:
     recording, states = fly(Dive(duration=30.0, missing=0.3))
     inputs = inputs_of(recording)
-    run = kalman_pass(TRUTH, states[:, 0], np.array([3e-6, 1e-4, 0.0, 0.0]), inputs)
-    error, _ = innovations(TRUTH, states[:, 0], inputs)
+    run = kalman_pass(TRUTH, np.append(states[:, 0], 0.0), np.array([3e-6, 1e-4, 0.0, 0.0]), inputs)
+    error, _ = innovations(TRUTH, np.append(states[:, 0], 0.0), inputs)
     assert np.allclose(run.error, error, atol=1e-12)
     assert np.allclose(run.gains, 0.0)
 
@@ -68,13 +68,13 @@ def test_kalman_likelihood_equals_the_dense_gaussian() -> None:
     recording, states = fly(Dive(duration=1.2, force_density=(0.02, 0.05)))
     inputs = inputs_of(recording)
     noise = np.array([3e-6, 1e-4, 0.02, 0.05])
-    run = kalman_pass(TRUTH, states[:, 0], noise, inputs)
+    run = kalman_pass(TRUTH, np.append(states[:, 0], 0.0), noise, inputs)
     rows = recording.time.size
     filtered = 0.0
     for k in range(rows):
         S = np.array([[run.variance[0, k], run.variance[1, k]], [run.variance[1, k], run.variance[2, k]]])
         filtered += multivariate_normal.logpdf(run.error[:, k], cov=S)
-    mean = free_run(TRUTH, states[:, 0], inputs).outputs
+    mean = free_run(TRUTH, np.append(states[:, 0], 0.0), inputs).outputs
     A = _transition_by_differences(inputs)
     Q = np.diag([noise[2], noise[3], 0.0, 0.0]) * recording.step
     step_noise = A @ (Q / 2) @ A.T + Q / 2
@@ -95,5 +95,5 @@ def test_kalman_likelihood_equals_the_dense_gaussian() -> None:
 
 
 def _transition_by_differences(inputs):  # type: ignore[no-untyped-def]
-    base = free_run(TRUTH, np.zeros(4), inputs).states[:, 1]
-    return np.column_stack([free_run(TRUTH, unit, inputs).states[:, 1] - base for unit in np.eye(4)])
+    base = free_run(TRUTH, np.zeros(5), inputs).states[:, 1]
+    return np.column_stack([free_run(TRUTH, unit, inputs).states[:, 1] - base for unit in np.eye(5)[:4]])

@@ -34,7 +34,7 @@ def dive(rng: np.random.Generator, rows: int = 1500) -> Recording:
     )
     inputs = inputs_of(true)
     inputs.drive[1] = true.speed  # as it was, not smoothed
-    pitch, depth = free_run(BASE, np.array([0.0, 0.0, 0.0, 20.0]), inputs).outputs
+    pitch, depth = free_run(BASE, np.array([0.0, 0.0, 0.0, 20.0, 0.0]), inputs).outputs
     return replace(
         true,
         pitch=pitch + PITCH_NOISE * rng.standard_normal(rows),
