@@ -168,7 +168,10 @@ class Fitter:
         starts = [start]
         if not parent.fit.has_process_noise and is_far(self, parent):
             starts.append(guess(self, start, names))
-        return self.explained(names, self.fitted(starts))
+        fit = self.fitted(starts)
+        if not np.isfinite(fit.log_likelihood):  # without them it runs away from where they held it
+            fit = self.fitted([guess(self, start, names)])
+        return self.explained(names, fit)
 
     def reduced(self, explanation: Explanation, names: Names) -> Explanation:
         """The set with these members only."""

@@ -414,3 +414,17 @@ def test_a_slow_plane_is_found_where_the_base_took_it_for_a_slow_hull(
 def test_a_hull_of_usual_damping_begins_as_it_is() -> None:
     fitter = Fitter([hidden_dive(duration=40.0)])
     assert with_usual_pitch(fitter, fitter.root, "actuator_rate_limit", []) == []
+
+
+def test_a_set_that_runs_away_without_an_effect_begins_anew_from_the_motion() -> None:
+    fitter = Fitter([hidden_dive(duration=40.0)])
+    found = fitter.base
+    for name in ("munk_moment", "heave_pitch_rate_coupling", "pitch_quadratic_damping"):
+        found = fitter.grown(found, name, [])
+    names, values = found.fit.structure.names, found.fit.parameters.copy()
+    for name, value in {"c_qw": 50.0, "c_wq": 2.0, "c_qq": -10.0}.items():
+        values[names.index(name)] = value  # a hull that turns broadside, which the damping alone holds
+    held = replace(found, fit=replace(found.fit, parameters=values))
+    start = fitter.point(held.names - {"pitch_quadratic_damping"}, held)
+    assert not np.isfinite(fitter.fitted([start]).log_likelihood)
+    assert fitter.excess(fitter.shrunk(held, "pitch_quadratic_damping").fit) < 1.1
