@@ -15,6 +15,7 @@ import numpy as np
 
 from host.gauss_newton import GaussNewton, Mask, Point
 from host.recording import Array
+from host.start_prior import start_cost
 
 DIFFERENCE = 1e-3  # of a log noise level, or of one that has a sign, for derivatives
 LONGEST_STRIDE = 2.5  # of the same in one step
@@ -74,6 +75,7 @@ def place(point: Point, model: NoiseModel[P]) -> Place[P]:
     with np.errstate(all="ignore"):
         passes = model.passes(point)
         likelihood = -0.5 * sum(float(np.sum(_quadratic(run) + np.log(_det(run)))) for run in passes)
+        likelihood -= start_cost(point.initial)
     return Place(point, passes, likelihood if np.isfinite(likelihood) else -np.inf)
 
 

@@ -62,7 +62,7 @@ class Chain:
 
     p            parameters by name
     extra        states of effects by name
-    excess       u / u0 - 1 at the first row, within a recording whose speed is not measured
+    excess       u / u0 - 1 at the first row, of a recording whose speed is not measured
     speed        u, m/s, measured where `is_speed_known` is 1; `speed_ratio` u / u0, on which forces depend;
     surge        u', m/s^2, of the measured speed
     command      rad, the plane as commanded; `earlier` the commands of the rows before, newest first

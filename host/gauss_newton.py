@@ -11,12 +11,12 @@ from scipy.linalg import cho_factor, cho_solve
 from host.equations import Structure
 from host.propagate import NX0
 from host.recording import Array
+from host.start_prior import start_normal
 from host.straightened import slopes, stepped
 
 Mask = NDArray[np.bool_]
 SHORTER = (1e-9, 1e-6, 1e-4)  # dampings, of which the first is as good as none
-# std of host.equations.START; keeps short dives solvable
-INITIAL_STATE_PRIOR = np.array([1.0, 1.0, 1.0, 100.0, 0.3])
+SOLVABLE = np.diag([1.0, 1.0, 1.0, 1e-4, 1.0])  # information on host.equations.START, for short dives
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,11 +77,12 @@ class GaussNewton:
         count = int(self.free.sum())
         self.H, self.g = np.zeros((count, count)), np.zeros(count)
         self.own: list[tuple[Array, Array, Array]] = []
-        for H, g in normal:
+        for (H, g), x0 in zip(normal, self.point.initial, strict=True):
             self.H += H[:count, :count]
             self.g += g[:count]
-            Hxx = H[count:, count:] + np.diag(INITIAL_STATE_PRIOR**-2.0)
-            self.own.append((H[:count, count:], Hxx, g[count:]))
+            information, score = start_normal(x0)
+            Hxx = H[count:, count:] + information + SOLVABLE
+            self.own.append((H[:count, count:], Hxx, g[count:] + score))
 
     def spread(self) -> Array:
         """Deviation of each free parameter if all else were known."""

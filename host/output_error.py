@@ -19,6 +19,7 @@ from host.interval_likelihood import (
 from host.propagate import Inputs, Run, free_run
 from host.recording import Array
 from host.sensitivities import sensitivities
+from host.start_prior import start_cost
 
 # rad^2, m^2: below any sensor, so that noise-free data divide by no zero
 SMALLEST_NOISE = np.array([1e-12, 1e-10])
@@ -45,7 +46,7 @@ def output_error(
     """
     point, damping, converged, iterations = start, 1e-3, False, 0
     runs = _free_runs(point, inputs)
-    noise, cost = _likeliest_noise(_errors(runs, inputs), inputs)
+    noise, cost = _cost(point, runs, inputs)
     parts = _innovations(point, runs, inputs)
     if not np.isfinite(cost) or diverges(parts, inputs):
         return run_away(point, inputs, free)
@@ -55,7 +56,7 @@ def output_error(
         while True:
             trial = step.trial(damping)
             runs = _free_runs(trial, inputs)
-            trial_noise, trial_cost = _likeliest_noise(_errors(runs, inputs), inputs)
+            trial_noise, trial_cost = _cost(trial, runs, inputs)
             if trial_cost < cost or damping > 1e8:
                 break
             damping = max(damping * 8.0, LEAST_DAMPING)
@@ -109,7 +110,7 @@ def diverges(parts: list[tuple[Array, Array]], inputs: list[Inputs], scale: floa
 
 def free_run_cost(point: Point, inputs: list[Inputs]) -> float:
     """-log L of the free run at a point, but for a constant; inf where it runs away."""
-    _, cost = _likeliest_noise(_errors(_free_runs(point, inputs), inputs), inputs)
+    _, cost = _cost(point, _free_runs(point, inputs), inputs)
     return cost if np.isfinite(cost) else np.inf
 
 
@@ -127,6 +128,12 @@ def residuals_at(
         parts = [(error, np.empty((2, 0, error.shape[1]))) for error in _errors(runs, inputs)]
     white = _whitened_by(point.noise, parts, inputs)
     return white, _deviance(point.noise, parts, white, inputs)
+
+
+def _cost(point: Point, runs: list[Run], inputs: list[Inputs]) -> tuple[Array, float]:
+    """The likeliest noise variances (2,) of free runs, and -log L there, that of their start with it."""
+    noise, cost = _likeliest_noise(_errors(runs, inputs), inputs)
+    return noise, cost + start_cost(point.initial)
 
 
 def _free_runs(point: Point, inputs: list[Inputs]) -> list[Run]:

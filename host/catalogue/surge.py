@@ -30,11 +30,8 @@ def _speed_loss(c: Chain) -> None:
 
 
 def _begins(c: Chain) -> ca.SX:
-    """At the measured speed, where it is corrected; else in steady flight, or, within a recording, off that.
-
-    Were it free where a short recording begins, it would do the work of other physics there.
-    """
-    found = ca.if_else(c.time > 0, c.p["u0"] * c.excess * (1 - c.is_speed_known), 0)
+    """At the measured speed, where it is corrected; else as far off steady flight as the motion tells."""
+    found = c.p["u0"] * c.excess * (1 - c.is_speed_known)
     return found + (c.speed - c.p["u0"]) * c.is_speed_known if "speed_gain" in c.p else found
 
 
