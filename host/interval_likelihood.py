@@ -17,16 +17,21 @@ from host.recording import Array
 
 LEAST_DEVIATION = 1.0 / 30.0  # of the step: no model is better than that within it
 LEAST_INFORMATION = 1e-12  # of that without rounding
+SURE = 8.3  # deviations from the nearer end of the interval, within which a reading says nothing
 ACCURACY = 1e-4  # relative, of the deviation
 
 
 def log_probability(error: Array, step: float, deviation: float) -> Array:
     """log P of readings with errors (N,)."""
-    upper, lower = (error + 0.5 * step) / deviation, (error - 0.5 * step) / deviation
+    off = np.abs(error)
+    is_sure = off < 0.5 * step - SURE * deviation  # P is 1 to the last digit
+    off = off[~is_sure]
     # In the left tail, where the distribution function keeps its digits.
-    upper, lower = np.where(lower > 0.0, (-lower, -upper), (upper, lower))
-    first = log_ndtr(upper)
-    return np.asarray(first + np.log(-np.expm1(np.minimum(log_ndtr(lower) - first, -1e-300))))
+    first = log_ndtr((0.5 * step - off) / deviation)
+    other = log_ndtr((-0.5 * step - off) / deviation)
+    found = np.zeros_like(error)
+    found[~is_sure] = first + np.log(-np.expm1(np.minimum(other - first, -1e-300)))
+    return found
 
 
 def likeliest_deviation(errors: Array, step: float) -> tuple[float, float]:

@@ -58,6 +58,7 @@ class Fitter:
     thinned  the recordings for what takes errors for normal
     speed_errors  how those of a measured speed make depth drift, where that matters
     wander   (3, 2) of what else drifts (host.drift), variances in units of the white noise: as in `known`
+    at_first  effects alone beside the root, as far as these were fitted before the search
     candidates  entries that are tried: what changes at one moment only after an alarm, or as `eligible` tells
     """
 
@@ -93,6 +94,7 @@ class Fitter:
             self.held[LAST] = min(self.held[LAST], max(alarms) + ALARM_EARLY)
         self._longest_substep = LONGEST_SUBSTEP
         self._inputs: dict[tuple[bool, bool], list[Inputs]] = {}  # by whether they hold earlier commands
+        self.at_first: dict[Names, Explanation] = {}
         self.base = self._base() if known is None else known
         parameters = self.base.fit.parameters
         self._longest_substep = longest_substep(parameters, min(r.step for r in recordings))

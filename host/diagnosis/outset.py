@@ -115,13 +115,17 @@ def _beside_what_leads(
 ) -> list[Explanation]:
     """The likeliest of these, each with all that every vehicle has and alone, where the rest does not pay.
 
-    The likeliest of all once more from where all but the faint ends, if something is left.
+    The likeliest of all once more from where all but the faint ends, if something is left. Where one alone
+    leaves nothing, it alone.
 
     whole  all that every vehicle has without these
     """
     with Workers(fitter, jobs) as workers:
         alone = workers.results([(Fitter.grown, (fitter.root, name, [])) for name in names])
+        fitter.at_first |= {one.names: one.lean() for one in alone}
         leading: list[Explanation] = sorted(alone, key=lambda e: e.bic)[:LEADING]
+        if leading[0].leaves_white and fitter.excess(leading[0].fit) < LITTLE:
+            return leading[:1]
         beside: list[Explanation] = workers.results([(all_beside, (one,)) for one in leading])
     best, begun = min(zip(beside, leading, strict=True), key=lambda pair: pair[0].bic)
     found = [*leading, *beside]

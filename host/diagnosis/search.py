@@ -185,7 +185,10 @@ class Search:
         return dict(zip(others, found, strict=True))
 
     def growth(self, parent: Explanation, name: str) -> Task:
-        """The fit of a set with one effect, or form of unknown physics, more."""
+        """The fit of a set with one effect, or form of unknown physics, more, unless it was made before."""
+        known = self.fitter.at_first.get(parent.names | {name})
+        if known is not None and parent.bic == self.fitter.root.bic:
+            return _known, (known,)
         return Fitter.grown, (parent, name, self.values(name))
 
     def shrink(self, explanation: Explanation, smaller: Iterable[Names]) -> None:
@@ -290,3 +293,7 @@ class Search:
     def is_hopeless(self, best: Explanation) -> bool:
         """Whether much is left although all that every vehicle has was tried at once."""
         return bool(self.joint) and self.fitter.excess(best.fit) > MUCH
+
+
+def _known(_: Fitter, explanation: Explanation) -> Explanation:
+    return explanation
