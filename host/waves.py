@@ -15,6 +15,7 @@ only their ratios are well known, and few steps would not get there.
 """
 
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import casadi as ca
@@ -35,6 +36,7 @@ from host.valleys import A2, with_usual_heave
 SLOWEST = 0.2  # rad/s; slower is current
 BROADEST = 0.4  # of a sea: 0.26 fits the waves of a fully developed one, 0.1 those of a young one
 FIRST_DAMPING = 0.1
+DAMPINGS = (0.02, 0.05)  # to begin with where the innovations swing: weak waves show in a narrow band only
 FREQUENCIES = np.geomspace(0.3, 4.0, 10)  # rad/s, to begin with; each is within the band of the next
 IN_BAND = 10.0  # times the density of the white forces
 SWINGS = np.array([[0.3, 0.3], [0.3, 0.01], [0.01, 0.3]])  # of depth and pitch, times the sensors' noise
@@ -243,8 +245,9 @@ def _first(start: Fit, inputs: list[Inputs]) -> Point:
 
     Of weak waves white forces tell nothing: most of what those do is a slow drift, which is not there.
     """
-    d, a2, points = FIRST_DAMPING, start.parameters[A2], []
-    for s in FREQUENCIES:
+    a2, points = start.parameters[A2], []
+    bands = [(FIRST_DAMPING, s) for s in FREQUENCIES] + list(product(DAMPINGS, _swinging(start, inputs)))
+    for d, s in bands:
         # In their band they push harder than white forces, which push everywhere; climb swings with w' / s.
         as_forces = IN_BAND * start.noise[2:] * 4.0 * d**2 * s**4 / np.array([s**2, a2**2])
         # Depth swings by f / s and pitch by a2 g / s, whose variances are density / (4 d s^3).
@@ -253,6 +256,21 @@ def _first(start: Fit, inputs: list[Inputs]) -> Point:
             levels = np.array([*start.noise[:2], s, d, 0.0, *driving])
             points.append(Point(start.structure, start.parameters, start.initial, levels))
     return max(points, key=lambda point: likelihood_in_waves(point, inputs))
+
+
+def _swinging(start: Fit, inputs: list[Inputs]) -> list[float]:
+    """Where pitch and depth swing most of all frequencies of waves, rad/s, by the longest innovations."""
+    white, one = max(zip(start.whitened, inputs, strict=True), key=lambda pair: pair[0].shape[1])
+    step = one.drive[4, 1] - one.drive[4, 0]
+    frequency = 2.0 * np.pi * np.fft.rfftfreq(white.shape[1], step)
+    shortest, longest = WAVE_PERIODS
+    in_band = (2.0 * np.pi / longest < frequency) & (frequency < 2.0 * np.pi / shortest)
+    if not in_band.any():
+        return []
+    width = 2 * int(DAMPINGS[0] / frequency[1]) + 1  # a band as wide as the damping makes it at 1 rad/s
+    power = np.abs(np.fft.rfft(np.nan_to_num(white), axis=1)) ** 2
+    smooth = np.array([np.convolve(channel, np.ones(width), mode="same") for channel in power])
+    return [float(s) for s in frequency[in_band][np.argmax(smooth[:, in_band], axis=1)]]
 
 
 def likelihood_in_waves(point: Point, inputs: list[Inputs]) -> float:

@@ -111,16 +111,18 @@ def test_no_noise_level_can_be_moved_uphill(which: str) -> None:
             )  # what the last step may leave
 
 
-def test_waves_are_found_with_their_frequency_and_bias_nothing() -> None:
-    recording, _ = fly(Dive(duration=150.0))
-    rng = np.random.default_rng(8)
-    radius, frequency = np.exp(-0.1 * 1.2 * 0.1), 1.2
+def sway(recording, frequency: float, damping: float, force: float, seed: int) -> None:  # type: ignore[no-untyped-def]
+    """Adds what waves of a band do: a heave force of this deviation, m/s^2, and as much pitch, rad/s^2."""
+    rng, rows = np.random.default_rng(seed), recording.time.size
+    radius = np.exp(-damping * frequency * 0.1)
     swing = [1.0, -2.0 * radius * np.cos(frequency * 0.1), radius**2]
-    waves = np.array([np.asarray(lfilter([1.0], swing, rng.standard_normal(2100)))[600:] for _ in range(2)])
-    waves *= 0.02 / waves.std(axis=1, keepdims=True)
+    waves = np.array(
+        [np.asarray(lfilter([1.0], swing, rng.standard_normal(rows + 600)))[600:] for _ in range(2)]
+    )
+    waves *= force / waves.std(axis=1, keepdims=True)
     a1, a2, a3, _, _, u0 = TABLE_1.values()
     w = q = theta = zeta = 0.0
-    for k in range(1500):  # the motion that the waves add; small steps, for the hull is linear
+    for k in range(rows):  # the motion that the waves add; small steps, for the hull is linear
         recording.pitch[k] += theta
         recording.depth[k] += zeta
         for _ in range(10):
@@ -130,6 +132,12 @@ def test_waves_are_found_with_their_frequency_and_bias_nothing() -> None:
                 theta + 0.01 * q,
                 zeta + 0.01 * (w - u0 * theta),
             )
+
+
+def test_waves_are_found_with_their_frequency_and_bias_nothing() -> None:
+    recording, _ = fly(Dive(duration=150.0))
+    frequency = 1.2
+    sway(recording, frequency, damping=0.1, force=0.02, seed=8)
     fit = fit_maximum_likelihood([recording])
     assert fit.has_process_noise
     assert fit.waves[0] == pytest.approx(frequency, rel=0.1)
@@ -232,3 +240,16 @@ def test_a_noise_level_that_loses_the_recording_where_it_is_moved_stays() -> Non
     assert moved[3] == noise[3]
     assert np.isfinite(moved).all()
     assert (moved[:3] != noise[:3]).all()
+
+
+def test_waves_far_below_the_noise_are_found_by_the_band_in_which_they_swing() -> None:
+    recording, _ = fly(Dive(duration=150.0, seed=9))
+    sway(
+        recording, 1.0, damping=0.01, force=0.002, seed=9
+    )  # a quarter of the depth's noise, a seventh of pitch's
+    inputs = [inputs_of(recording)]
+    white = filter_error(fit_maximum_likelihood([recording], noise_model="output_error"), inputs)
+    swaying = in_waves(white, inputs)
+    assert is_sea(swaying)
+    assert swaying.waves[0] == pytest.approx(1.0, rel=0.05)
+    assert swaying.log_likelihood > white.log_likelihood + 5.0
