@@ -17,7 +17,7 @@ TRUE = {"heave_pitch_rate_coupling", "pitch_quadratic_damping"}
 
 
 def coupled(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
-    return 0.3 * x[1], -3.0 * x[1] * abs(x[1]), 0.0
+    return 0.6 * x[1], -3.0 * x[1] * abs(x[1]), 0.0
 
 
 @pytest.fixture(scope="module")
