@@ -65,8 +65,8 @@ def test_nothing_hidden_is_no_mismatch() -> None:
     assert sum(found.slots.values()) == 0.0
 
 
-def test_coupling_of_pitch_rate_into_heave_is_named_with_its_coefficient() -> None:
-    found = diagnose([hidden_dive(lambda _, x, __: (0.8 * x[1], 0.0, 0.0), duration=120.0)])
+def test_coupling_of_pitch_rate_into_heave_is_named_with_its_coefficient(coupled: Diagnosis) -> None:
+    found = coupled
     assert found.verdict == "explained"
     assert found.effects[0].name == "heave_pitch_rate_coupling"
     value, std, unit = found.effects[0].coefficients["c_wq"]
