@@ -112,7 +112,7 @@ class GaussNewton:
 
     def _promised(self, damping: float) -> float:
         reduced, rhs = self._reduced()
-        if not np.isfinite(reduced).all():
+        if not _is_finite(reduced, rhs):
             return 0.0  # as no step is taken there
         start = sum(float(gx @ np.linalg.solve(Hxx, gx)) for _, Hxx, gx in self.own)
         scale = np.sqrt(np.maximum(np.diag(self.H), 1e-300))
@@ -141,7 +141,7 @@ class GaussNewton:
         In the coordinates of host.straightened.
         """
         reduced, rhs = self._reduced()
-        if not np.isfinite(reduced).all():
+        if not _is_finite(reduced, rhs):
             return self.point  # the model has run away: no step is better than none
         names, here = self.point.structure.names, self.point.parameters
         T = slopes(names, here)[np.ix_(self.free, self.free)]
@@ -183,6 +183,10 @@ class GaussNewton:
             reached = np.clip(reached, lower, upper)
             inside &= ~leaving
         return reached
+
+
+def _is_finite(reduced: Array, rhs: Array) -> bool:
+    return bool(np.isfinite(reduced).all() and np.isfinite(rhs).all())
 
 
 def _solve(normal: Array, rhs: Array) -> Array:

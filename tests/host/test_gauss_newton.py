@@ -64,10 +64,15 @@ def test_the_others_make_up_for_what_stops_at_its_bound() -> None:
     assert np.sum((error - S @ moved) ** 2) < np.sum((error - S @ clipped) ** 2)
 
 
-def test_where_the_slopes_leave_the_numbers_nothing_is_promised_and_no_step_taken() -> None:
+@pytest.mark.parametrize(("slopes", "errors"), [(np.inf, 0.0), (0.0, np.inf), (0.0, np.nan)])
+def test_where_the_numbers_are_left_nothing_is_promised_and_no_step_taken(
+    slopes: float, errors: float
+) -> None:
     step, S, _ = linear_problem(3, drag=-1.0, share=1.0)
-    lost = step.with_normal([(np.full((S.shape[1] + 5,) * 2, np.inf), np.zeros(S.shape[1] + 5))])
+    size = S.shape[1] + 5
+    lost = step.with_normal([(slopes + np.eye(size), np.full(size, errors))])
     assert lost.promise() == 0.0
+    assert lost.predicted_cost(7.0) == 7.0
     assert lost.trial(1.0) is lost.point
 
 
