@@ -10,13 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.stats import chi2
 
-from host.catalogue import named
 from host.diagnosis.answer import Against, Answer
-from host.diagnosis.comparison import SIGNIFICANCE, compare, side_of
+from host.diagnosis.comparison import compare, side_of
+from host.diagnosis.contained import contained
 from host.diagnosis.diagnose import Diagnosis, diagnose
-from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
 from host.errors import RecordingError
@@ -46,9 +44,9 @@ def against_simulation(
     fitter = Fitter(found.recordings, known=found.extended)
     # Named at the sensors' noise, but measured with less of it: a simulator's coefficients are exact.
     quiet = _through_sensors_of(found.recordings, simulated, QUIET**2 * found.floor)
-    contained = _with_ours(Fitter(quiet, known=theirs.extended), theirs.extended, found.extended)
-    own = Fitter(seen, known=contained)
-    comparison = compare(fitter, found.extended, side_of(contained))
+    inside = contained(Fitter(quiet, known=theirs.extended), theirs.extended, found.extended)
+    own = Fitter(seen, known=inside)
+    comparison = compare(fitter, found.extended, side_of(inside))
     errors = [
         np.vstack([r.pitch - s.pitch, r.depth - s.depth])
         for r, s in zip(found.recordings, quiet, strict=True)
@@ -56,7 +54,7 @@ def against_simulation(
     both = np.sqrt(np.nanmean(np.hstack(errors) ** 2, axis=1))
     details = {
         "sha256": simulated[0].sha256,
-        "contains": sorted(contained.names),
+        "contains": sorted(inside.names),
         "added_noise": {
             "pitch_rad": float(np.sqrt(found.floor[0])),
             "depth_m": float(np.sqrt(found.floor[1])),
@@ -71,22 +69,9 @@ def against_simulation(
         comparison=comparison,
         details=details,
         recorded=quiet,
-        is_understood=leftover(own, own.polished(contained)).is_nothing,
+        is_understood=leftover(own, own.polished(inside)).is_nothing,
     )
     return Answer(found=found, against=against)
-
-
-def _with_ours(fitter: Fitter, contained: Explanation, ours: Explanation) -> Explanation:
-    """What a simulation contains, asked for each effect of the recording: less evidence will then do."""
-    contained = fitter.polished(contained)
-    for name in sorted(ours.names - contained.names):
-        values = dict(zip(ours.fit.structure.names, ours.fit.parameters, strict=True))
-        start = np.array([values[parameter.name] for parameter in named(name).parameters])
-        grown = fitter.polished(fitter.grown(contained, name, [start]))
-        gain = 2.0 * (grown.fit.log_likelihood - contained.fit.log_likelihood)
-        if gain > chi2.isf(SIGNIFICANCE, start.size):
-            contained = grown
-    return contained
 
 
 def check_same_flight(recordings: list[Recording], simulated: list[Recording]) -> None:

@@ -11,8 +11,11 @@ from hidden_dive import hidden_dive
 
 from host.diagnosis.answer import Answer
 from host.diagnosis.comparison import Comparison, EffectDifference, Side, at_speed, sentences
+from host.diagnosis.contained import contained
 from host.diagnosis.diagnose import Diagnosis
+from host.diagnosis.explanation import Explanation
 from host.diagnosis.files import document
+from host.diagnosis.fitter import Fitter
 from host.diagnosis.given_simulation import against_simulation, check_same_flight
 from host.diagnosis.report import summary
 from host.errors import RecordingError
@@ -115,6 +118,40 @@ def test_a_weaker_effect_in_the_simulation_is_no_missing_one(coupled: Diagnosis)
     (different,) = answer.against.comparison.effects
     assert different.status == "different"
     assert different.given["c_wq"][0] == pytest.approx(0.3, abs=0.06)
+
+
+def grown(fitter: Fitter, *names: str) -> Explanation:
+    explanation = fitter.base
+    for name in names:
+        explanation = fitter.polished(fitter.grown(explanation, name, []))
+    return explanation
+
+
+@pytest.fixture(scope="module")
+def ours() -> Explanation:
+    dive = hidden_dive(lambda _, x, __: (0.8 * x[1], 0.0, 0.0), seed=1)
+    return grown(Fitter([dive]), "heave_pitch_rate_coupling")
+
+
+@pytest.mark.parametrize("mistaken", [("munk_moment", "actuator_lag"), ("depth_sensor_lag",)])
+def test_what_a_simulation_was_mistaken_to_hold_gives_way_to_what_the_recording_shows(
+    ours: Explanation, mistaken: tuple[str, ...]
+) -> None:
+    def physics(_: float, x: np.ndarray, __: float) -> tuple[float, float, float]:  # type: ignore[type-arg]
+        w, q, theta, _ = x
+        return 0.3 * q, 0.0, w * (np.cos(theta) - 1.0) - 2.5 * (np.sin(theta) - theta)
+
+    quiet = Fitter([hidden_dive(physics, seed=1, noise=0.1)])
+    held = contained(quiet, grown(quiet, *mistaken), ours)
+    values = dict(zip(held.fit.structure.names, held.fit.parameters, strict=True))
+    assert held.names == {"heave_pitch_rate_coupling", "large_angle_kinematics"}
+    assert values["c_wq"] == pytest.approx(0.3, abs=0.02)
+
+
+def test_a_trace_of_an_effect_is_none_of_it(ours: Explanation) -> None:
+    quiet = Fitter([hidden_dive(lambda _, x, __: (0.05 * x[1], 0.0, 0.0), seed=1, noise=0.1)])
+    assert grown(quiet, "heave_pitch_rate_coupling").bic < quiet.base.bic
+    assert not contained(quiet, quiet.base, ours).names
 
 
 def test_a_simulation_in_finer_steps_is_read_at_the_recorded_rows(coupled: Diagnosis) -> None:
