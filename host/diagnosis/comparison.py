@@ -23,6 +23,7 @@ from host.equations import NAMES, PARAMETERS
 from host.uncertainty import covariance
 
 SIGNIFICANCE = 1e-3  # chance that one of two equal coefficients is called different
+OPEN = 1e3  # deviations beyond this many times the value say that the motion tells nothing of it
 TOOLS = frozenset({PLANE_BEFORE.name, SPEED_CORRECTION.name})  # of one recording, and no physics
 Status = Literal["missing", "superfluous", "different", "same"]
 Value = tuple[float, float]
@@ -247,8 +248,10 @@ def sentences(found: Comparison, given: str) -> list[str]:
 
 
 def _said(name: str, value: float, std: float, unit: str) -> str:
-    return f"{name} = {_figure(value, std)} {unit}"
+    return f"{name} = {_figure(value, std)}" + f" {unit}" * (unit != "1")
 
 
 def _figure(value: float, std: float) -> str:
+    if std > OPEN * max(abs(value), 1.0):
+        return f"{value:.4g} (open)"
     return f"{value:.4g} +- {std:.2g}" if std > 0.0 else f"{value:.4g}"

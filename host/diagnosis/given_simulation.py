@@ -36,16 +36,16 @@ def against_simulation(
 
     simulated  as it was read
 
-    Raises RecordingError with one line when the two do not share recorded file, time span or rudder.
+    Raises RecordingError with one line where it does not cover the recording; see `check_same_flight`.
     """
     seen = _through_sensors_of(found.recordings, simulated, found.floor)
     theirs = diagnose(seen, lambda stage: on_progress(f"simulation: {stage}"), jobs, like=found.extended)
     on_progress("simulation against recording")
     fitter = Fitter(found.recordings, known=found.extended)
     # Named at the sensors' noise, but measured with less of it: a simulator's coefficients are exact.
-    quiet = _through_sensors_of(found.recordings, simulated, QUIET**2 * found.floor)
+    quiet = _as_steered(theirs, _through_sensors_of(found.recordings, simulated, QUIET**2 * found.floor))
     inside = contained(Fitter(quiet, known=theirs.extended), theirs.extended, found.extended)
-    own = Fitter(seen, known=inside)
+    own = Fitter(theirs.recordings, known=inside)
     comparison = compare(fitter, found.extended, side_of(inside))
     errors = [
         np.vstack([r.pitch - s.pitch, r.depth - s.depth])
@@ -76,15 +76,33 @@ def against_simulation(
 
 def check_same_flight(recordings: list[Recording], simulated: list[Recording]) -> None:
     """Raises RecordingError with one line when the two do not share recorded file, time span or rudder."""
-    _through_sensors_of(recordings, simulated, np.zeros(2))
+    if len({recording.name for recording in recordings}) > 1:
+        raise RecordingError("--simulation goes with one recording: that whose rudder it flew")
+    for recording in recordings:
+        one = _covering(recording, simulated)
+        apart = float(np.sqrt(np.mean((_rudder(one, recording.time) - recording.rudder) ** 2)))
+        if apart > RUDDER_DOUBT * max(float(np.std(recording.rudder)), 1e-6):
+            raise RecordingError(
+                f"{one.name}: its rudder must be that of {recording.name} (they are "
+                f"{np.degrees(apart):.3g} deg rms apart); simulate on the recorded rudder"
+            )
+
+
+def _as_steered(diagnosed: Diagnosis, recordings: list[Recording]) -> list[Recording]:
+    """With what the plane was found to do between their rows."""
+    return [
+        replace(one, rudder=each.rudder, has_moving_plane=each.has_moving_plane)
+        for one, each in zip(recordings, diagnosed.recordings, strict=True)
+    ]
 
 
 def _through_sensors_of(
     recordings: list[Recording], simulated: list[Recording], floor: Array
 ) -> list[Recording]:
-    """The simulation at the recording's rows, with its losses and white noise (2,), rad^2 and m^2."""
-    if len({recording.name for recording in recordings}) > 1:
-        raise RecordingError("--simulation goes with one recording: that whose rudder it flew")
+    """The simulation at the recording's rows, with its losses and white noise (2,), rad^2 and m^2.
+
+    Its rudder is as it was given: what a simulator did with it between rows is asked of its own motion.
+    """
     rng = np.random.default_rng(SEED)
     return [_seen(recording, _covering(recording, simulated), floor, rng) for recording in recordings]
 
@@ -102,14 +120,6 @@ def _covering(recording: Recording, simulated: list[Recording]) -> Recording:
 
 
 def _seen(recording: Recording, one: Recording, floor: Array, rng: np.random.Generator) -> Recording:
-    latest = np.searchsorted(one.time, recording.time + 1e-6 * one.step, side="right") - 1
-    rudder = one.rudder[np.clip(latest, 0, one.time.size - 1)]
-    apart = float(np.sqrt(np.mean((rudder - recording.rudder) ** 2)))
-    if apart > RUDDER_DOUBT * max(float(np.std(recording.rudder)), 1e-6):
-        raise RecordingError(
-            f"{one.name}: its rudder must be that of {recording.name} (they are {np.degrees(apart):.3g} deg "
-            "rms apart); simulate on the recorded rudder"
-        )
     noise = np.sqrt(floor)[:, None] * rng.standard_normal((2, recording.time.size))
     pitch, depth = (_at(one, values, recording.time) for values in (one.pitch, one.depth))
     speed = np.full(recording.time.size, np.nan)
@@ -121,9 +131,18 @@ def _seen(recording: Recording, one: Recording, floor: Array, rng: np.random.Gen
         sha256=one.sha256,
         pitch=np.where(np.isfinite(recording.pitch), pitch + noise[0], np.nan),
         depth=np.where(np.isfinite(recording.depth), depth + noise[1], np.nan),
+        rudder=_rudder(one, recording.time),
+        has_moving_plane=False,
+        notes=(),
         speed=speed,
         pitch_rate=np.full(recording.time.size, np.nan),
     )
+
+
+def _rudder(one: Recording, time: Array) -> Array:
+    """The simulated rudder that was last told at each time."""
+    latest = np.searchsorted(one.time, time + 1e-6 * one.step, side="right") - 1
+    return np.asarray(one.rudder[np.clip(latest, 0, one.time.size - 1)])
 
 
 def _at(one: Recording, values: Array, time: Array) -> Array:

@@ -19,6 +19,7 @@ from host.diagnosis.fitter import Fitter
 from host.diagnosis.given_simulation import against_simulation, check_same_flight
 from host.diagnosis.report import summary
 from host.errors import RecordingError
+from host.plane_between_rows import with_moving_plane
 from host.recording import Recording
 from tools.cli import main
 
@@ -83,6 +84,13 @@ def test_of_what_was_measured_no_coefficient_is_told() -> None:
     )
     (said,) = sentences(Comparison(effects=[missing], parameters=[]), "simulation")
     assert said == "speed loss is missing from the simulation."
+
+
+def test_what_has_no_unit_is_told_without_and_what_the_motion_leaves_open_is_called_so() -> None:
+    stall = {"stall_angle": (0.25, 0.01), "stall_loss": (1.5, 0.01), "stall_share": (0.0, 1e57)}
+    missing = EffectDifference(name="rudder_stall", status="missing", recorded=stall, given={}, evidence=99.0)
+    (said,) = sentences(Comparison(effects=[missing], parameters=[]), "simulation")
+    assert said.endswith("stall_angle = 0.25 +- 0.01 rad, stall_loss = 1.5 +- 0.01, stall_share = 0 (open).")
 
 
 def test_the_same_hull_at_another_speed_is_the_same() -> None:
@@ -186,6 +194,17 @@ def test_a_simulation_of_something_else_is_refused(
     error = capsys.readouterr().err
     assert complaint in error
     assert error.count("\n") == 1
+
+
+def test_what_the_plane_did_between_rows_is_asked_of_each_side_alone(coupled: Diagnosis) -> None:
+    simulated = hidden_dive(seed=1, noise=0.0)
+    told = replace(coupled, recordings=[with_moving_plane(recording) for recording in coupled.recordings])
+    assert told.recordings[0].has_moving_plane
+    answer = against_simulation(told, [simulated])
+    assert answer.against is not None
+    (seen,) = answer.against.recorded
+    np.testing.assert_array_equal(seen.rudder, simulated.rudder)
+    assert not seen.has_moving_plane
 
 
 def test_one_simulation_belongs_to_one_recording() -> None:
