@@ -1,8 +1,9 @@
 """A simulator's output on the recording's own rudder: the physics it holds against what the recording shows.
 
-The simulation is diagnosed like a recording, through the recording's own sensors: its rows, its losses, and
-white noise as large as theirs, from a fixed seed. So only physics that matters at that noise is named, and
-what a simulator's integrator leaves is not.
+The simulation is diagnosed like a recording, through far better sensors than the recording's own: its rows,
+its losses, and a tenth of its white noise, from a fixed seed. With as much noise one set of effects may do
+another's work; with none what its integrator leaves would be physics. What does not matter at the recording's
+noise drops out when the two are compared.
 """
 
 from collections.abc import Callable
@@ -22,7 +23,7 @@ from host.recording import Array, Recording
 from host.speed import smoothed_speed
 
 SEED = 0
-QUIET = 0.1  # of the sensors' noise, with which the coefficients of a simulation are measured
+QUIET = 0.1  # of the sensors' noise, through which a simulation is seen
 RUDDER_DOUBT = 0.05  # of the recorded rudder's spread, rms: beyond it the simulation flew something else
 
 
@@ -38,15 +39,14 @@ def against_simulation(
 
     Raises RecordingError with one line where it does not cover the recording; see `check_same_flight`.
     """
-    seen = _through_sensors_of(found.recordings, simulated, found.floor)
-    theirs = diagnose(seen, lambda stage: on_progress(f"simulation: {stage}"), jobs, like=found.extended)
+    quiet = _through_sensors_of(found.recordings, simulated, QUIET**2 * found.floor)
+    theirs = diagnose(quiet, lambda stage: on_progress(f"simulation: {stage}"), jobs, like=found.extended)
     on_progress("simulation against recording")
-    fitter = Fitter(found.recordings, known=found.extended)
-    # Named at the sensors' noise, but measured with less of it: a simulator's coefficients are exact.
-    quiet = _as_steered(theirs, _through_sensors_of(found.recordings, simulated, QUIET**2 * found.floor))
-    inside = contained(Fitter(quiet, known=theirs.extended), theirs.extended, found.extended)
-    own = Fitter(theirs.recordings, known=inside)
-    comparison = compare(fitter, found.extended, side_of(inside))
+    inside = contained(Fitter(theirs.recordings, known=theirs.extended), theirs.extended, found.extended)
+    comparison = compare(Fitter(found.recordings, known=found.extended), found.extended, side_of(inside))
+    # A simulator may do more than the catalogue knows; it matters where the sensors would show it.
+    seen = _as_steered(theirs, _through_sensors_of(found.recordings, simulated, found.floor))
+    own = Fitter(seen, known=inside)
     errors = [
         np.vstack([r.pitch - s.pitch, r.depth - s.depth])
         for r, s in zip(found.recordings, quiet, strict=True)
@@ -56,8 +56,8 @@ def against_simulation(
         "sha256": simulated[0].sha256,
         "contains": sorted(inside.names),
         "added_noise": {
-            "pitch_rad": float(np.sqrt(found.floor[0])),
-            "depth_m": float(np.sqrt(found.floor[1])),
+            "pitch_rad": float(QUIET * np.sqrt(found.floor[0])),
+            "depth_m": float(QUIET * np.sqrt(found.floor[1])),
             "seed": SEED,
         },
         "depth_rmse_m": float(both[1]),

@@ -72,7 +72,7 @@ def test_the_answer_in_the_file(answer: Answer) -> None:
     simulation = document(answer)["simulation"]
     assert simulation["file"] == "sim.csv"
     assert simulation["contains"] == ["heave_quadratic_drag"]
-    assert simulation["added_noise"]["depth_m"] == pytest.approx(0.01, rel=0.2)
+    assert simulation["added_noise"]["depth_m"] == pytest.approx(0.001, rel=0.2)
     status = {effect["name"]: effect["status"] for effect in simulation["effects"]}
     assert status == {"heave_pitch_rate_coupling": "missing", "heave_quadratic_drag": "superfluous"}
     assert any("is missing from the simulation" in sentence for sentence in simulation["sentences"])

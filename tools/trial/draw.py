@@ -12,6 +12,7 @@ from tools.trial.answers import Answer, Floor
 from tools.trial.coefficients import free_of_mass, true_coefficients
 from tools.trial.deck import Card
 from tools.trial.fleet import Fleet, hideable
+from tools.trial.flight import Flight
 from tools.trial.hidden import STRANGERS, Hidden, Setting, draw_hidden, switched, with_strength
 from tools.trial.outing import LONGEST_STEP, Outing, draw_outing, with_amplitude
 from tools.trial.published import NATIVE, SLOW_STEP, draw_published, draw_servo, draw_steady
@@ -37,10 +38,11 @@ class CannotDraw(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawn:
-    """A recording, as a table to be written, and what it hides."""
+    """A recording, as a table to be written, what it hides, and how it was flown."""
 
     table: Table
     answer: Answer
+    flight: Flight
 
 
 def draw(seed: int, number: int, card: Card, fleet: Fleet = "linear") -> Drawn:
@@ -244,7 +246,14 @@ def _written(
             depth_m=[round(value, 6) for value in voyage.depth.tolist()],
         ),
     )
-    return Drawn(table=table, answer=answer)
+    flight = Flight(
+        scenario=outing.scenario,
+        seed=seed,
+        acting=(*hidden, *usual),
+        setting=setting,
+        commands=voyage.command,
+    )
+    return Drawn(table=table, answer=answer, flight=flight)
 
 
 def _of_published(drawn: Drawn, vehicle: str) -> Drawn:

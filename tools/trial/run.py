@@ -19,6 +19,7 @@ DIAGNOSES = "diagnoses"
 RUN_FILE = "run.json"
 TRUE_FILE = "true_structure.json"
 MOST_SECONDS = 1800.0
+DIAGNOSE = (sys.executable, "-m", "tools.cli", "diagnose")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,16 +42,18 @@ def diagnose_all(
     recordings: list[Path],
     jobs: int,
     on_done: Callable[[], None],
-    command: tuple[str, ...] = (),
+    command: tuple[str, ...] = DIAGNOSE,
+    also: Callable[[Path], tuple[str, ...]] = lambda _: (),
 ) -> dict[str, Run]:
     """The runs by name of recording; those that have answered before are kept and not repeated.
 
     command    in place of `mils diagnose`; RECORDING --out DIR --jobs 1 --quiet is added
+    also       more that the command is told with a recording
     """
     runs = {}
     with ThreadPoolExecutor(jobs) as pool:
         waiting = {
-            pool.submit(_diagnose, path, folder / DIAGNOSES / path.stem, command): path.stem
+            pool.submit(_diagnose, path, folder / DIAGNOSES / path.stem, (*command, *also(path))): path.stem
             for path in recordings
         }
         for done in as_completed(waiting):
@@ -103,7 +106,6 @@ def _diagnose(recording: Path, out: Path, command: tuple[str, ...]) -> Run:
         if kept.has_answered:
             return kept
     out.mkdir(parents=True, exist_ok=True)
-    command = command or (sys.executable, "-m", "tools.cli", "diagnose")
     spoken = out / "said.txt"
     began = time.monotonic()
     with spoken.open("w", encoding="utf-8") as voice:
