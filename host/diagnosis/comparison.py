@@ -6,9 +6,10 @@ left of the difference is tested by likelihood ratio: how much worse the recordi
 coefficients are held at the other side's values and all else is free.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -25,6 +26,7 @@ from host.uncertainty import covariance
 SIGNIFICANCE = 1e-3  # chance that one of two equal coefficients is called different
 OPEN = 1e3  # deviations beyond this many times the value say that the motion tells nothing of it
 TOOLS = frozenset({PLANE_BEFORE.name, SPEED_CORRECTION.name})  # of one recording, and no physics
+NOTHING_KNOWN: Mapping[str, float] = MappingProxyType({})
 Status = Literal["missing", "superfluous", "different", "same"]
 Value = tuple[float, float]
 """A coefficient and its deviation."""
@@ -99,10 +101,15 @@ def at_speed(side: Side, speed: float) -> Side:
     return replace(side, values=values | {"u0": (speed, side.values["u0"][1])})
 
 
-def compare(fitter: Fitter, own: Explanation, other: Side) -> Comparison:
+def compare(
+    fitter: Fitter, own: Explanation, other: Side, std: Mapping[str, float] = NOTHING_KNOWN
+) -> Comparison:
     """Sets the explanation of the fitter's recordings against the other side.
 
     Where forces follow a measured speed, both are told at the recordings' own.
+
+    std  the least deviations of our coefficients: those that know of what else every vehicle has, too little
+         to be named, which the other side may hold
     """
     # A speed taken as it was measured says nothing of what changes it.
     untold = SURGE if all(other.values.get(name) == (value, 0.0) for name, value in SURGE.items()) else {}
@@ -113,7 +120,8 @@ def compare(fitter: Fitter, own: Explanation, other: Side) -> Comparison:
     joint = _in_words_of(fitter, own, other)
     free = fitter.free(joint.names)
     is_free = dict(zip(joint.fit.structure.names, free.tolist(), strict=True))
-    recorded = _values(joint)
+    plain = _values(joint)
+    recorded = {key: (value, max(least, std.get(key, 0.0))) for key, (value, least) in plain.items()}
     effects = []
     for name in joint.names - TOOLS:
         mine = _of(name, recorded)
@@ -125,7 +133,8 @@ def compare(fitter: Fitter, own: Explanation, other: Side) -> Comparison:
             continue
         given = _of(name, other.values)
         compared = [key for key in given if is_free[key] and key not in untold]
-        cost = _cost(fitter, joint, {key: given[key] for key in compared}) / _doubt(mine, given, compared)
+        cost = _cost(fitter, joint, {key: given[key] for key in compared})
+        cost /= _doubt(plain, mine, given, compared)
         status: Status = "same"
         if cost > chi2.isf(SIGNIFICANCE, max(len(compared), 1)):
             status = "different" if worth > NAMING_MARGIN else "superfluous"
@@ -169,10 +178,12 @@ def _cost(fitter: Fitter, joint: Explanation, held: dict[str, Value]) -> float:
     return max(2.0 * lost, 0.0)
 
 
-def _doubt(mine: dict[str, Value], given: dict[str, Value], names: Iterable[str]) -> float:
-    """By how much the other side's own uncertainty adds to the recording's, as a ratio of variances."""
-    ratios = [(given[name][1] / max(mine[name][1], 1e-300)) ** 2 for name in names]
-    return 1.0 + float(np.mean(ratios)) if ratios else 1.0
+def _doubt(
+    plain: dict[str, Value], mine: dict[str, Value], given: dict[str, Value], names: Iterable[str]
+) -> float:
+    """By how much more uncertain both sides are than the likelihood of the recording says, in variances."""
+    ratios = [(mine[name][1] ** 2 + given[name][1] ** 2) / max(plain[name][1], 1e-150) ** 2 for name in names]
+    return float(np.mean(ratios)) if ratios else 1.0
 
 
 def _values(explanation: Explanation) -> dict[str, Value]:

@@ -39,7 +39,7 @@ def against_model(found: Diagnosis, model: VehicleModel, name: str) -> Answer:
     fitter = Fitter(recordings, known=found.extended)
     if found.horizon is not None:  # it is foretold from where a filter is, with forces of its own
         base = _among_forces(base, fitter)
-    comparison = compare(fitter, found.extended, _side(model))
+    comparison = compare(fitter, found.extended, _side(model), found.std)
     known = {effect.name: effect for effect in found.effects}
     effects = [_named(one, known) for one in comparison.named("missing", "different") if one.name in BY_NAME]
     longest = max(recordings, key=lambda recording: recording.duration)

@@ -43,7 +43,8 @@ def against_simulation(
     theirs = diagnose(quiet, lambda stage: on_progress(f"simulation: {stage}"), jobs, like=found.extended)
     on_progress("simulation against recording")
     inside = contained(Fitter(theirs.recordings, known=theirs.extended), theirs.extended, found.extended)
-    comparison = compare(Fitter(found.recordings, known=found.extended), found.extended, side_of(inside))
+    fitter = Fitter(found.recordings, known=found.extended)
+    comparison = compare(fitter, found.extended, side_of(inside), found.std)
     # A simulator may do more than the catalogue knows; it matters where the sensors would show it.
     seen = _as_steered(theirs, _through_sensors_of(found.recordings, simulated, found.floor))
     own = Fitter(seen, known=inside)

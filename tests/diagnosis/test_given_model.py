@@ -107,6 +107,17 @@ def test_a_base_coefficient_that_is_off(coupled: Diagnosis) -> None:
     assert answer.found.slots["pitch"] == pytest.approx(1.0)
 
 
+def test_what_else_a_vehicle_may_have_makes_its_coefficients_less_certain(coupled: Diagnosis) -> None:
+    doubtful = replace(coupled, std=coupled.std | {"c_wq": 0.5, "a2": 0.5})
+    model = given(coupled, {"heave_pitch_rate_coupling": {"c_wq": 0.2}}, a2=-3.0)
+    answer = against_model(doubtful, model, "m.json")
+    assert answer.against is not None
+    (effect,) = answer.against.comparison.effects
+    assert effect.status == "same"
+    assert effect.recorded["c_wq"][1] == 0.5
+    assert not any(p.is_different for p in answer.against.comparison.parameters)
+
+
 def test_a_trim_offset_of_the_model_is_buoyancy_too_much(coupled: Diagnosis) -> None:
     model = given(coupled, {"heave_pitch_rate_coupling": {"c_wq": 0.8}}, heave_offset=0.05)
     answer = against_model(coupled, model, "m.json")
