@@ -244,7 +244,7 @@ def sentences(found: Comparison, given: str) -> list[str]:
             said.append(f"{title} is too much in the {given} ({listed}): the recording shows none of it.")
         elif effect.status == "different":
             pairs = ", ".join(
-                f"{_said(k, *effect.given[k], unit[k])} instead of {_figure(*effect.recorded[k])}"
+                f"{_said(k, *effect.given[k], unit[k])} instead of {figure(*effect.recorded[k])}"
                 for k in effect.given
             )
             said.append(f"{title} is in the {given}, but with {pairs}.")
@@ -253,16 +253,17 @@ def sentences(found: Comparison, given: str) -> list[str]:
         if one.is_different:
             said.append(
                 f"{_said(one.name, *one.given, units[one.name])} in the {given}, but "
-                f"{_figure(*one.recorded)} in the recording."
+                f"{figure(*one.recorded)} in the recording."
             )
     return said or [f"The {given} holds the physics that the recording shows, with the same coefficients."]
 
 
 def _said(name: str, value: float, std: float, unit: str) -> str:
-    return f"{name} = {_figure(value, std)}" + f" {unit}" * (unit != "1")
+    return f"{name} = {figure(value, std)}" + f" {unit}" * (unit != "1")
 
 
-def _figure(value: float, std: float) -> str:
+def figure(value: float, std: float) -> str:
+    """A coefficient with its deviation, where it has one; "open" where that says it may be anything."""
     if std > OPEN * max(abs(value), 1.0):
         return f"{value:.4g} (open)"
     return f"{value:.4g} +- {std:.2g}" if std > 0.0 else f"{value:.4g}"

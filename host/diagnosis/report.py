@@ -9,9 +9,10 @@ from jinja2 import Environment, FileSystemLoader, select_autoescape
 from host.catalogue import BY_NAME, structure_of
 from host.catalogue.moments import SCANS
 from host.diagnosis.answer import Against, Answer
-from host.diagnosis.comparison import Status
+from host.diagnosis.comparison import Status, figure
 from host.diagnosis.deviations import interval
 from host.diagnosis.diagnose import Diagnosis, NamedEffect
+from host.diagnosis.fitter import SURGE
 from host.diagnosis.pictures import (
     base_name,
     force_picture,
@@ -208,8 +209,8 @@ def _against(answer: Answer) -> dict[str, Any] | None:
         {
             "name": f"{title(effect.name)}: {key}",
             "status": effect.status,
-            "recorded": _figure(effect.recorded.get(key)),
-            "given": _figure(effect.given.get(key)),
+            "recorded": _figure(effect.recorded.get(key), key),
+            "given": _figure(effect.given.get(key), key),
         }
         for effect in against.comparison.effects
         for key in effect.recorded or effect.given
@@ -226,10 +227,11 @@ def _against(answer: Answer) -> dict[str, Any] | None:
     return {"kind": against.kind, "name": against.name, "sentences": against.sentences, "rows": rows}
 
 
-def _figure(value: tuple[float, float] | None) -> str:
+def _figure(value: tuple[float, float] | None, name: str = "") -> str:
     if value is None:
         return "none"
-    return f"{value[0]:.4g} +- {value[1]:.2g}" if value[1] > 0.0 else f"{value[0]:.4g}"
+    # A speed that was measured stands for the equation that would give it.
+    return "measured" if value == (SURGE.get(name), 0.0) else figure(*value)
 
 
 def _sentence(words: str) -> str:

@@ -8,7 +8,7 @@ import pytest
 from host.catalogue import BY_NAME
 from host.catalogue.moments import SCANS
 from host.diagnosis.answer import Against, Answer
-from host.diagnosis.comparison import compare, side_of
+from host.diagnosis.comparison import Comparison, EffectDifference, compare, side_of
 from host.diagnosis.diagnose import Diagnosis, NamedEffect
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.report import _dated, write_report
@@ -74,6 +74,17 @@ def test_the_other_side_is_set_beside_the_recording(coupled: Diagnosis, tmp_path
     assert f"Your {kind} against the recording" in shown
     assert f"missing from the {kind}" in shown
     assert ("given model" in shown) == (kind == "model")
+
+
+def test_of_a_measured_speed_no_coefficient_is_shown(coupled: Diagnosis, tmp_path: Path) -> None:
+    held = {"speed_time": (10.0, 0.0), "c_ud": (0.0, 0.0), "c_uq": (0.0, 0.0)}
+    told = {"speed_time": (6.5, 0.1), "c_ud": (1.9, 0.1), "c_uq": (0.0, 1e9)}
+    surge = EffectDifference(name="speed_loss", status="same", recorded=held, given=told, evidence=0.0)
+    against = Against(kind="simulation", name="s.csv", comparison=Comparison(effects=[surge], parameters=[]))
+    shown = page(Answer(found=coupled, against=against), tmp_path)
+    assert shown.count("<td>measured</td>") == 3
+    assert "<td>6.5 +- 0.1</td>" in shown
+    assert "<td>0 (open)</td>" in shown
 
 
 def test_what_is_not_explained_is_not_recommended(coupled: Diagnosis, tmp_path: Path) -> None:
