@@ -3,7 +3,11 @@
 from itertools import combinations
 from typing import TYPE_CHECKING
 
-from host.catalogue.kin import OFFSETS
+import numpy as np
+
+from host.catalogue import named
+from host.catalogue.kin import OFFSETS, measure_alike
+from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, ROUGH, margin
@@ -48,6 +52,11 @@ def with_best_offsets(search: "Search") -> Explanation:
     return best
 
 
+def with_offsets_asked_again(search: "Search", best: Explanation, is_new: bool) -> Explanation:
+    """The set with what shifts the steady state told as is likeliest, of a new set for all offsets."""
+    return with_lasting_offsets(search, with_likeliest_offsets(search, best) if is_new else best)
+
+
 def with_likeliest_offsets(search: "Search", best: Explanation) -> Explanation:
     """The set with an offset exchanged for another, where that is likelier beside its other members.
 
@@ -58,6 +67,24 @@ def with_likeliest_offsets(search: "Search", best: Explanation) -> Explanation:
     tasks: list[Task] = [(retrimmed, (best, way)) for way in sorted(ways, key=sorted)]
     found = [search.remember(e) for e in search.workers.results(tasks)]
     return min([best, *search.polished_near(found, best.bic)], key=lambda e: e.bic)
+
+
+def with_lasting_offsets(search: "Search", best: Explanation) -> Explanation:
+    """The set with an offset in the place of a change of the same, where that is likelier.
+
+    A change in the first seconds may be one: it made up for what else was lacking there when it was found.
+    """
+    pairs = [(change, offset) for change in sorted(best.names & {*SCANS}) for offset in OFFSETS]
+    for change, offset in pairs:
+        is_asked = change in best.names and offset not in best.names
+        if not is_asked or not measure_alike(named(change), named(offset)):
+            continue
+        values = dict(zip(best.fit.structure.names, best.fit.parameters.tolist(), strict=True))
+        size = np.array([values[named(change).parameters[0].name]])
+        fewer = search.fitter.shrunk(best, change)
+        lasting = search.fitter.polished(search.fitter.grown(fewer, offset, [size]))
+        best = min(best, search.remember(lasting), key=lambda e: e.bic)
+    return best
 
 
 def with_one_offset(search: "Search", best: Explanation) -> Explanation:

@@ -20,7 +20,7 @@ from host.diagnosis.exchange import exchanged, twins
 from host.diagnosis.explanation import Explanation, Names
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.margins import LARGEST_SET, MUCH, ROUGH, SMALL
-from host.diagnosis.offset_choice import with_best_offsets, with_likeliest_offsets, with_one_offset
+from host.diagnosis.offset_choice import with_best_offsets, with_offsets_asked_again, with_one_offset
 from host.diagnosis.outset import goes_on_from
 from host.diagnosis.prospects import gain
 from host.diagnosis.pruning import pruned
@@ -117,7 +117,7 @@ class Search:
         self.on_progress("settling")
         found = self._settled(with_best_offsets(self))
         best = with_one_offset(self, told_by_the_usual(self, whole(self, completed(self, found))))
-        return best if best is found else with_likeliest_offsets(self, best)
+        return with_offsets_asked_again(self, best, best is not found)
 
     def singles(self) -> list[Explanation]:
         """Each effect alone on top of the root; what else may change, where the likeliest is a change."""

@@ -14,6 +14,7 @@ from host.diagnosis.candidates import eligible
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.exchange import exchanged
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.offset_choice import with_lasting_offsets
 from host.diagnosis.prospects import _moments, probed
 from host.diagnosis.search import Search
 from host.diagnosis.spans import divide
@@ -262,3 +263,17 @@ def test_where_water_moves_a_measured_speed_may_not_be_through_it(has_speed: boo
     for name, is_there in (("current_change", has_speed), ("ballast_change", False)):
         found = all_beside(fitter, fitter.grown(fitter.root, name, []))
         assert ("speed_over_ground" in found.names) is is_there
+
+
+@pytest.mark.parametrize(("when", "left"), [(-1.0, "rudder_offset"), (WHEN, "rudder_offset_change")])
+def test_a_change_that_was_there_from_the_first_is_an_offset(when: float, left: str) -> None:
+    def bent(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+        zero = 0.02 * (time > when)
+        return BASE["b1"] * zero, BASE["b2"] * zero, 0.0
+
+    fitter = Fitter([hidden_dive(bent)])
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.base)
+        start = np.array([0.02, max(when, 0.5)])
+        changed = fitter.polished(fitter.grown(fitter.base, "rudder_offset_change", [start]))
+        assert with_lasting_offsets(search, changed).names == {left}
