@@ -41,7 +41,8 @@ class Case:
 class Said:
     """What was said of a simulation.
 
-    missing  effects, with those that could not be told from them
+    missing    effects, with those that could not be told from them
+    different  effects whose coefficients differ, and coefficients of the base equations that do
     """
 
     missing: dict[str, frozenset[str]]
@@ -53,6 +54,10 @@ class Said:
     def is_faithful(self) -> bool:
         return not self.missing and not self.too_much and not self.different
 
+    def __str__(self) -> str:
+        parts = {"lacks": tuple(self.missing), "too much": self.too_much, "differs in": self.different}
+        return ", ".join(f"{verb} {', '.join(names)}" for verb, names in parts.items() if names) or "alike"
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Prints a line for each recording and the rates of all."""
@@ -60,11 +65,19 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=12, metavar="N", help="recordings (default 12)")
     parser.add_argument("--seed", type=int, default=0, help="of what is drawn (default 0)")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes at once (default 2)")
-    parser.add_argument("--out", type=Path, default=Path("simulations"), metavar="DIR")
+    parser.add_argument(
+        "--out", type=Path, default=Path("simulations"), metavar="DIR", help="an empty folder, or none yet"
+    )
     args = parser.parse_args(arguments)
+    if args.count < 1 or args.jobs < 1:
+        print("--count and --jobs must be at least 1", file=sys.stderr)
+        return 2
     require_bench()
     folder: Path = args.out
     folder.mkdir(parents=True, exist_ok=True)
+    if any(folder.iterdir()):  # what was diagnosed there is kept, and may be of other recordings
+        print(f"{folder} is not empty: give another --out", file=sys.stderr)
+        return 2
     cases = []
     for case in islice(_written(folder, args.seed), args.count):
         cases.append(case)
@@ -95,11 +108,8 @@ def told(cases: list[Case], said: dict[str, Said | None]) -> list[str]:
         if answer is None:
             lines.append(f"{case.name}: no answer")
             continue
-        missing = ", ".join(answer.missing) or "nothing"
-        lines.append(
-            f"{case.name} {answer.seconds:.0f} s: lacks {', '.join(sorted(case.lacking)) or 'nothing'}; "
-            f"said: lacks {missing}" + f", too much {', '.join(answer.too_much)}" * bool(answer.too_much)
-        )
+        lacking = ", ".join(sorted(case.lacking)) or "nothing"
+        lines.append(f"{case.name} {answer.seconds:.0f} s: lacks {lacking}; said: {answer}")
         clean += not answer.too_much
         if not case.lacking:
             faithful += 1
@@ -158,10 +168,11 @@ def _said(diagnosis: dict[str, Any] | None, seconds: float) -> Said | None:
     by_status: dict[str, list[str]] = {"missing": [], "superfluous": [], "different": []}
     for effect in diagnosis["simulation"]["effects"]:
         by_status.setdefault(effect["status"], []).append(effect["name"])
+    coefficients = [one["name"] for one in diagnosis["simulation"]["parameters"] if one["is_different"]]
     return Said(
         missing={name: twins.get(name, frozenset()) for name in by_status["missing"]},
         too_much=tuple(by_status["superfluous"]),
-        different=tuple(by_status["different"]),
+        different=(*by_status["different"], *coefficients),
         seconds=seconds,
     )
 

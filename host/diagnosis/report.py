@@ -205,12 +205,16 @@ def _against(answer: Answer) -> dict[str, Any] | None:
     against = answer.against
     if against is None:
         return None
+    # A speed that was measured stands for the equation that would give it.
+    is_measured = answer.found.recordings[0].has_speed
+    held = {"recorded": SURGE if is_measured else {}}
+    held["given"] = held["recorded"] if against.kind == "simulation" else {}
     rows = [
         {
             "name": f"{title(effect.name)}: {key}",
             "status": effect.status,
-            "recorded": _figure(effect.recorded.get(key), key),
-            "given": _figure(effect.given.get(key), key),
+            "recorded": _figure(effect.recorded.get(key), held["recorded"].get(key)),
+            "given": _figure(effect.given.get(key), held["given"].get(key)),
         }
         for effect in against.comparison.effects
         for key in effect.recorded or effect.given
@@ -227,11 +231,10 @@ def _against(answer: Answer) -> dict[str, Any] | None:
     return {"kind": against.kind, "name": against.name, "sentences": against.sentences, "rows": rows}
 
 
-def _figure(value: tuple[float, float] | None, name: str = "") -> str:
+def _figure(value: tuple[float, float] | None, held: float | None = None) -> str:
     if value is None:
         return "none"
-    # A speed that was measured stands for the equation that would give it.
-    return "measured" if value == (SURGE.get(name), 0.0) else figure(*value)
+    return "measured" if value == (held, 0.0) else figure(*value)
 
 
 def _sentence(words: str) -> str:

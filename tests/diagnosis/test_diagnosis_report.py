@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from host.catalogue import BY_NAME
@@ -81,7 +82,9 @@ def test_of_a_measured_speed_no_coefficient_is_shown(coupled: Diagnosis, tmp_pat
     told = {"speed_time": (6.5, 0.1), "c_ud": (1.9, 0.1), "c_uq": (0.0, 1e9)}
     surge = EffectDifference(name="speed_loss", status="same", recorded=held, given=told, evidence=0.0)
     against = Against(kind="simulation", name="s.csv", comparison=Comparison(effects=[surge], parameters=[]))
-    shown = page(Answer(found=coupled, against=against), tmp_path)
+    assert "measured</td>" not in page(Answer(found=coupled, against=against), tmp_path)
+    sailed = [replace(r, speed=np.full(r.time.size, 2.5)) for r in coupled.recordings]
+    shown = page(Answer(found=replace(coupled, recordings=sailed), against=against), tmp_path)
     assert shown.count("<td>measured</td>") == 3
     assert "<td>6.5 +- 0.1</td>" in shown
     assert "<td>0 (open)</td>" in shown

@@ -50,7 +50,7 @@ def test_what_was_said_is_counted() -> None:
         "a 20 s: lacks munk_moment, net_buoyancy; said: lacks vertical_current, trim_m"
     )
     assert lines[0].endswith(", too much actuator_lag")
-    assert lines[2] == "c 20 s: lacks nothing; said: lacks nothing"
+    assert lines[2] == "c 20 s: lacks nothing; said: alike"
     assert lines[3] == "d: no answer"
     assert [line.rsplit(": ", 1)[1] for line in lines[4:]] == ["1 of 2", "2 of 3", "2 of 3", "1 of 1"]
 
@@ -74,7 +74,9 @@ def test_recordings_and_simulations_are_written_and_the_answers_read(
         out = folder / "diagnoses" / path.stem
         out.mkdir(parents=True)
         effect = {"name": "actuator_lag", "indistinguishable_from": ["actuator_delay"]}
-        against = {"effects": [{"name": "actuator_lag", "status": "missing"}]}
+        lag = {"name": "actuator_lag", "status": "missing"}
+        base = [{"name": "a1", "is_different": True}, {"name": "a2", "is_different": False}]
+        against = {"effects": [lag], "parameters": base}
         (out / "diagnosis.json").write_text(json.dumps({"effects": [effect], "simulation": against}))
         on_done()
         return {path.stem: Run(seconds=1.0, memory_mb=1.0, exit_code=0, said="")}
@@ -82,5 +84,8 @@ def test_recordings_and_simulations_are_written_and_the_answers_read(
     monkeypatch.setattr("tools.bench_simulation.diagnose_all", stub)
     assert main(["--count", "1", "--seed", "3", "--out", str(tmp_path)]) == 0
     captured = capsys.readouterr()
-    assert "said: lacks actuator_lag" in captured.out
+    assert "said: lacks actuator_lag, differs in a1\n" in captured.out
     assert captured.err == "drawn 1 of 1\ndiagnosed 1 of 1\n"
+    assert main(["--out", str(tmp_path)]) == 2  # would keep the answers to other recordings
+    assert capsys.readouterr().err == f"{tmp_path} is not empty: give another --out\n"
+    assert main(["--count", "0"]) == 2

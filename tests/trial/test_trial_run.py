@@ -16,6 +16,8 @@ with (out / "calls").open("a") as calls:
     calls.write("x")
 if recording.stem == "bad":
     sys.exit(2)
+if recording.stem == "broken":
+    raise ValueError
 (out / "diagnosis.json").write_text('{"verdict": "unexplained"}')
 sys.exit(1)
 """
@@ -48,16 +50,17 @@ def stub(tmp_path: Path) -> tuple[str, ...]:
 
 
 def test_answers_are_kept_and_failures_are_tried_again(tmp_path: Path, stub: tuple[str, ...]) -> None:
-    recordings = [tmp_path / "good.csv", tmp_path / "bad.csv"]
+    recordings = [tmp_path / f"{name}.csv" for name in ("good", "bad", "broken")]
     done = []
     for _ in range(2):
         runs = diagnose_all(tmp_path, recordings, 2, lambda: done.append(1), stub)
-    assert len(done) == 4
+    assert len(done) == 6
     assert runs["good"].has_answered
     assert runs["good"].seconds > 0.0
     assert runs["good"].memory_mb > 1.0
     assert not runs["bad"].has_answered
-    assert (tmp_path / "diagnoses" / "bad" / "calls").read_text() == "xx"
+    for failed in ("bad", "broken"):
+        assert (tmp_path / "diagnoses" / failed / "calls").read_text() == "xx"
     assert (tmp_path / "diagnoses" / "good" / "calls").read_text() == "x"
     assert read_result(tmp_path, "good", "diagnosis.json") == {"verdict": "unexplained"}
     assert read_result(tmp_path, "bad", "diagnosis.json") is None

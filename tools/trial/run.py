@@ -17,6 +17,7 @@ from tools.trial.answers import Answer
 ROOT = Path(__file__).parent.parent.parent
 DIAGNOSES = "diagnoses"
 RUN_FILE = "run.json"
+ANSWER_FILE = "diagnosis.json"
 TRUE_FILE = "true_structure.json"
 MOST_SECONDS = 1800.0
 DIAGNOSE = (sys.executable, "-m", "tools.cli", "diagnose")
@@ -103,7 +104,8 @@ def _diagnose(recording: Path, out: Path, command: tuple[str, ...]) -> Run:
     noted = out / RUN_FILE
     if noted.is_file():
         kept = Run(**json.loads(noted.read_text(encoding="utf-8")))
-        if kept.has_answered:
+        # Python ends with 1, too, where a command breaks off.
+        if kept.has_answered and (out / ANSWER_FILE).is_file():
             return kept
     out.mkdir(parents=True, exist_ok=True)
     spoken = out / "said.txt"
