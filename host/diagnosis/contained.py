@@ -20,6 +20,10 @@ def contained(fitter: Fitter, theirs: Explanation, ours: Explanation) -> Explana
     Either is asked for each effect of the other: less evidence will then do. At the sensors' noise one set
     may do another's work, with coefficients that no vehicle has; with little noise the simulation itself
     tells, and large angles are in most of them.
+
+    fitter  of the simulation with little noise
+    theirs  what it was diagnosed to hold
+    ours    what the recording was
     """
     candidates = [_with_those_of(fitter, fitter.polished(theirs), ours)]
     if SPEED_CORRECTION.name not in ours.names:  # of a speed that the simulation need not have
