@@ -1,9 +1,10 @@
 """Another side's physics (a model, a simulator) against what a recording shows, effect by effect.
 
 Twins would make the two look different where they agree, so the recording is first told in the other side's
-words: its effects join the explanation, and those of ours that are then no longer needed leave it. What is
-left of the difference is tested by likelihood ratio: how much worse the recording is met when an effect's
-coefficients are held at the other side's values and all else is free.
+words (host.diagnosis.other_side). What is left of the difference is tested by likelihood ratio: how much
+worse the recording is met when an effect's coefficients are held at the other side's values and all else is
+free. Where all of the other side as it stands loses no more than the freedom of our coefficients is worth,
+nothing differs, whatever we would call it.
 """
 
 from collections.abc import Iterable, Mapping
@@ -16,28 +17,16 @@ import numpy as np
 from scipy.stats import chi2
 
 from host.catalogue import named
-from host.catalogue.nuisance import PLANE_BEFORE, SPEED_CORRECTION
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import SURGE, Fitter
 from host.diagnosis.margins import NAMING_MARGIN
+from host.diagnosis.other_side import TOOLS, Side, Value, at_speed, in_words_of, side_of, there
 from host.equations import NAMES, PARAMETERS
-from host.uncertainty import covariance
 
 SIGNIFICANCE = 1e-3  # chance that one of two equal coefficients is called different
 OPEN = 1e3  # deviations beyond this many times the value say that the motion tells nothing of it
-TOOLS = frozenset({PLANE_BEFORE.name, SPEED_CORRECTION.name})  # of one recording, and no physics
 NOTHING_KNOWN: Mapping[str, float] = MappingProxyType({})
 Status = Literal["missing", "superfluous", "different", "same"]
-Value = tuple[float, float]
-"""A coefficient and its deviation."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Side:
-    """What the other side holds: its effects, and all its coefficients by parameter name."""
-
-    names: frozenset[str]
-    values: dict[str, Value]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,19 +77,6 @@ class Comparison:
         return not differs and not self.named("missing", "superfluous", "different")
 
 
-def side_of(explanation: Explanation) -> Side:
-    """An explanation as the other side of a comparison."""
-    return Side(names=explanation.names, values=_values(explanation))
-
-
-def at_speed(side: Side, speed: float) -> Side:
-    """The same physics at another forward speed, m/s: each coefficient grows with its power of it."""
-    parameters = [*PARAMETERS, *(p for name in side.names for p in named(name).parameters)]
-    growth = {p.name: (speed / side.values["u0"][0]) ** p.speed_power for p in parameters}
-    values = {name: (value * growth[name], std * growth[name]) for name, (value, std) in side.values.items()}
-    return replace(side, values=values | {"u0": (speed, side.values["u0"][1])})
-
-
 def compare(
     fitter: Fitter, own: Explanation, other: Side, std: Mapping[str, float] = NOTHING_KNOWN
 ) -> Comparison:
@@ -117,26 +93,28 @@ def compare(
     if is_speed_told and "speed_loss" in own.names | other.names:
         other = at_speed(other, fitter.held["u0"])
     other = replace(other, names=other.names - TOOLS)
-    joint = _in_words_of(fitter, own, other)
+    as_they_are = _as_they_are(fitter, own, other)
+    is_met = _lost(own, as_they_are) < chi2.isf(SIGNIFICANCE, int(fitter.free(own.names).sum()))
+    joint = fitter.polished(as_they_are) if is_met else in_words_of(fitter, own, other)
     free = fitter.free(joint.names)
     is_free = dict(zip(joint.fit.structure.names, free.tolist(), strict=True))
-    plain = _values(joint)
+    plain = side_of(joint).values
     recorded = {key: (value, max(least, std.get(key, 0.0))) for key, (value, least) in plain.items()}
     effects = []
     for name in joint.names - TOOLS:
-        mine = _of(name, recorded)
+        mine = {parameter.name: recorded[parameter.name] for parameter in named(name).parameters}
         worth = fitter.polished(fitter.shrunk(joint, name)).bic - joint.bic
         if name not in other.names:
             effects.append(
                 EffectDifference(name=name, status="missing", recorded=mine, given={}, evidence=worth)
             )
             continue
-        given = _of(name, other.values)
+        given = other.of(name)
         compared = [key for key in given if is_free[key] and key not in untold]
         cost = _cost(fitter, joint, {key: given[key] for key in compared})
         cost /= _doubt(plain, mine, given, compared)
         status: Status = "same"
-        if cost > chi2.isf(SIGNIFICANCE, max(len(compared), 1)):
+        if cost > chi2.isf(SIGNIFICANCE, max(len(compared), 1)) and not is_met:
             status = "different" if worth > NAMING_MARGIN else "superfluous"
         kept = {} if status == "superfluous" else mine
         effects.append(EffectDifference(name=name, status=status, recorded=kept, given=given, evidence=cost))
@@ -147,23 +125,20 @@ def compare(
             pair = ParameterDifference(
                 name=name, recorded=recorded[name], given=other.values[name], is_different=False
             )
-            parameters.append(replace(pair, is_different=pair.deviations > limit))
+            parameters.append(replace(pair, is_different=pair.deviations > limit and not is_met))
     return Comparison(effects=sorted(effects, key=lambda effect: -effect.evidence), parameters=parameters)
 
 
-def _in_words_of(fitter: Fitter, own: Explanation, other: Side) -> Explanation:
-    """The recording explained with the other side's effects, ours only where those do not do."""
-    joint = fitter.polished(own)
-    for name in sorted(other.names - own.names):
-        start = np.array([value for value, _ in _of(name, other.values).values()])
-        joint = fitter.polished(fitter.grown(joint, name, [start]))
-    for _ in own.names - other.names:
-        fewer = [fitter.polished(fitter.shrunk(joint, name)) for name in joint.names - other.names]
-        leanest = min(fewer, key=lambda explanation: explanation.bic, default=joint)
-        if leanest is joint or leanest.bic > joint.bic + NAMING_MARGIN:
-            break
-        joint = leanest
-    return joint
+def _as_they_are(fitter: Fitter, own: Explanation, other: Side) -> Explanation:
+    """The other side on our recordings, its coefficients as they are there."""
+    strict, start = copy(fitter), there(fitter, own, other)
+    strict.held = {name: value for name, (value, _) in other.values.items()} | fitter.held
+    return strict.explained(start.structure.effect_names, strict.fitted([start]))
+
+
+def _lost(likelier: Explanation, other: Explanation) -> float:
+    """2 log-likelihood."""
+    return 2.0 * (likelier.fit.log_likelihood - other.fit.log_likelihood)
 
 
 def _cost(fitter: Fitter, joint: Explanation, held: dict[str, Value]) -> float:
@@ -174,8 +149,7 @@ def _cost(fitter: Fitter, joint: Explanation, held: dict[str, Value]) -> float:
     for name, (value, _) in held.items():
         parameters[joint.fit.structure.names.index(name)] = value
     start = Explanation(joint.names, replace(joint.fit, parameters=parameters), joint.bic)
-    lost = joint.fit.log_likelihood - strict.polished(start).fit.log_likelihood
-    return max(2.0 * lost, 0.0)
+    return max(_lost(joint, strict.polished(start)), 0.0)
 
 
 def _doubt(
@@ -184,17 +158,6 @@ def _doubt(
     """By how much more uncertain both sides are than the likelihood of the recording says, in variances."""
     ratios = [(mine[name][1] ** 2 + given[name][1] ** 2) / max(plain[name][1], 1e-150) ** 2 for name in names]
     return float(np.mean(ratios)) if ratios else 1.0
-
-
-def _values(explanation: Explanation) -> dict[str, Value]:
-    fit = explanation.fit
-    std = np.sqrt(np.diag(covariance(fit))).tolist()
-    pairs = zip(fit.parameters.tolist(), std, strict=True)
-    return dict(zip(fit.structure.names, pairs, strict=True))
-
-
-def _of(name: str, values: dict[str, Value]) -> dict[str, Value]:
-    return {parameter.name: values[parameter.name] for parameter in named(name).parameters}
 
 
 def as_json(found: Comparison, given: str) -> dict[str, Any]:

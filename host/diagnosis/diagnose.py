@@ -102,6 +102,7 @@ def diagnose(
     on_progress: Callable[[str], None] = lambda _: None,
     jobs: int = 1,
     like: Explanation | None = None,
+    may_be_quiet: bool = False,
 ) -> Diagnosis:
     """Finds what the paper's equations lack on these recordings of one vehicle, on `jobs` cores.
 
@@ -109,13 +110,15 @@ def diagnose(
     plane did between rows: that is no physics.
 
     like  an explanation of a vehicle that this one should resemble: if of many effects, it is begun with
+    may_be_quiet  whether recordings that are smoother than sensors are taken as they are
 
     Raises RecordingError with one line where a recording is too short, or pitch or depth never changes or
     is hardly ever read.
     """
     check_usable(recordings)
     on_progress("base model")
-    seen = as_sensed(without_outliers(with_plane_told(recordings)))
+    seen = without_outliers(with_plane_told(recordings))
+    seen = seen if may_be_quiet else as_sensed(seen)
     first, *others = likelier_first(ways(seen), on_progress, jobs)
     return _diagnosed(first, others, on_progress, jobs, like, [])
 

@@ -6,11 +6,12 @@ import numpy as np
 
 from host.catalogue import BY_NAME, named
 from host.diagnosis.answer import Against, Answer
-from host.diagnosis.comparison import Comparison, EffectDifference, Side, compare
+from host.diagnosis.comparison import Comparison, EffectDifference, compare
 from host.diagnosis.diagnose import SLOTS, Diagnosis, NamedEffect
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.locate import locate
+from host.diagnosis.other_side import Side
 from host.diagnosis.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.sea_fits import levels
 from host.diagnosis.spans import divide

@@ -13,17 +13,19 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from host.diagnosis.answer import Against, Answer
-from host.diagnosis.comparison import compare, side_of
+from host.diagnosis.comparison import compare
 from host.diagnosis.contained import contained
 from host.diagnosis.diagnose import Diagnosis, diagnose
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.leftover import leftover
+from host.diagnosis.other_side import side_of
 from host.errors import RecordingError
 from host.recording import Array, Recording
 from host.speed import smoothed_speed
 
 SEED = 0
 QUIET = 0.1  # of the sensors' noise, through which a simulation is seen
+QUIETEST = np.array([np.radians(0.005), 0.0005])  # rad, m: what integrators leave is still less
 RUDDER_DOUBT = 0.05  # of the recorded rudder's spread, rms: beyond it the simulation flew something else
 
 
@@ -39,8 +41,11 @@ def against_simulation(
 
     Raises RecordingError with one line where it does not cover the recording; see `check_same_flight`.
     """
-    quiet = _through_sensors_of(found.recordings, simulated, QUIET**2 * found.floor)
-    theirs = diagnose(quiet, lambda stage: on_progress(f"simulation: {stage}"), jobs, like=found.extended)
+    noise = np.minimum(np.maximum(QUIET**2 * found.floor, QUIETEST**2), found.floor)
+    quiet = _through_sensors_of(found.recordings, simulated, noise)
+    theirs = diagnose(
+        quiet, lambda stage: on_progress(f"simulation: {stage}"), jobs, found.extended, may_be_quiet=True
+    )
     on_progress("simulation against recording")
     inside = contained(Fitter(theirs.recordings, known=theirs.extended), theirs.extended, found.extended)
     fitter = Fitter(found.recordings, known=found.extended)
@@ -57,8 +62,8 @@ def against_simulation(
         "sha256": simulated[0].sha256,
         "contains": sorted(inside.names),
         "added_noise": {
-            "pitch_rad": float(QUIET * np.sqrt(found.floor[0])),
-            "depth_m": float(QUIET * np.sqrt(found.floor[1])),
+            "pitch_rad": float(np.sqrt(noise[0])),
+            "depth_m": float(np.sqrt(noise[1])),
             "seed": SEED,
         },
         "depth_rmse_m": float(both[1]),

@@ -9,9 +9,10 @@ import pytest
 from host.catalogue import BY_NAME
 from host.catalogue.moments import SCANS
 from host.diagnosis.answer import Against, Answer
-from host.diagnosis.comparison import Comparison, EffectDifference, compare, side_of
+from host.diagnosis.comparison import Comparison, EffectDifference, compare
 from host.diagnosis.diagnose import Diagnosis, NamedEffect
 from host.diagnosis.fitter import Fitter
+from host.diagnosis.other_side import side_of
 from host.diagnosis.report import _dated, write_report
 from host.diagnosis.separation import separations
 

@@ -10,13 +10,14 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.diagnosis.answer import Answer
-from host.diagnosis.comparison import Comparison, EffectDifference, Side, at_speed, sentences
+from host.diagnosis.comparison import Comparison, EffectDifference, sentences
 from host.diagnosis.contained import contained
 from host.diagnosis.diagnose import Diagnosis
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.files import document
 from host.diagnosis.fitter import Fitter
 from host.diagnosis.given_simulation import against_simulation, check_same_flight
+from host.diagnosis.other_side import Side, at_speed
 from host.diagnosis.report import summary
 from host.errors import RecordingError
 from host.plane_between_rows import with_moving_plane

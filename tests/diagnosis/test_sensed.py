@@ -55,3 +55,9 @@ def test_a_simulator_s_output_without_noise_is_explained() -> None:
     assert (found.verdict, [effect.name for effect in found.effects]) == (
         "explained", ["heave_pitch_rate_coupling"],
     )  # fmt: skip
+
+
+def test_a_simulation_seen_with_less_noise_than_sensors_have_keeps_it() -> None:
+    quiet = hidden_dive(duration=60.0, noise=0.02)
+    (taken,) = diagnose([quiet], may_be_quiet=True).recordings
+    np.testing.assert_array_equal(taken.pitch, quiet.pitch)

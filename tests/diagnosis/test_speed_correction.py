@@ -8,12 +8,13 @@ import pytest
 
 from host.catalogue import structure_of
 from host.catalogue.nuisance import SPEED_CORRECTION
-from host.diagnosis.comparison import Side, compare, side_of
+from host.diagnosis.comparison import compare
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.explanation import Explanation
 from host.diagnosis.files import write_extended_model
 from host.diagnosis.fitter import SURGE, Fitter
 from host.diagnosis.given_model import against_model
+from host.diagnosis.other_side import Side, side_of
 from host.diagnosis.unknown_physics import known_in
 from host.model import read_model
 from host.propagate import free_run, inputs_of
