@@ -18,12 +18,32 @@ _MANY = 0.1  # share of a column
 
 
 def read_csv_recording(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> list[Recording]:
-    """Reads a text recording, separated by comma, semicolon or tab; several stretches when it has gaps.
+    """The stretches of a text recording, row by row; several when it has gaps.
+
+    Raises RecordingError with one line as `read_table` does, or when it holds no usable stretch.
+    """
+    return stretches_of(read_table(path, columns, needs), path, needs)
+
+
+def stretches_of(table: Recording, path: Path, needs: tuple[str, ...]) -> list[Recording]:
+    """A table cut at its gaps; what only fills a row between two readings is "not measured".
+
+    Raises RecordingError with one line when nothing usable is in it.
+    """
+    pieces = split_at_gaps(readings_alone(table), max(1.0, 2.5 * table.step), needs)
+    if not pieces:
+        raise RecordingError(
+            f"{path}: no stretch of 10 rows has {', '.join(needs)} together ({_summary(table.counts)})"
+        )
+    return pieces
+
+
+def read_table(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> Recording:
+    """All rows of a text recording, separated by comma, semicolon or tab; its rudder may be NaN, too.
 
     Rows whose time is missing, repeated or runs backwards are dropped and counted; any other cell that is
-    empty or not a finite number is "not measured", and so is what only fills a row between two readings.
-    Raises RecordingError with one line when the file is empty, is no text, lacks a column, or holds no usable
-    stretch.
+    empty or not a finite number is "not measured".
+    Raises RecordingError with one line when the file is empty, is no text or lacks a column.
     """
     header, rows, decimal = _read_rows(path)
     counts: Counter[str] = Counter(rows=len(rows))
@@ -50,8 +70,7 @@ def read_csv_recording(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEE
         raise RecordingError(
             f"{path}: only {int(keep.sum())} rows have a time that advances; at least 10 are needed"
         )
-    step = float(np.median(np.diff(values["time"])))
-    whole = Recording(
+    return Recording(
         name=path.name,
         sha256=file_sha256(path),
         time=values["time"] - values["time"][0],
@@ -60,16 +79,10 @@ def read_csv_recording(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEE
         rudder=values["rudder"],
         speed=values["speed"],
         pitch_rate=values["pitch_rate"],
-        step=step,
+        step=float(np.median(np.diff(values["time"]))),
         has_angle=columns.rudder.unit != "raw" or columns.rudder.scale != 1.0,
         counts=counts,
     )
-    pieces = split_at_gaps(readings_alone(whole), max(1.0, 2.5 * step), needs)
-    if not pieces:
-        raise RecordingError(
-            f"{path}: no stretch of 10 rows has {', '.join(needs)} together ({_summary(counts)})"
-        )
-    return pieces
 
 
 def _read_rows(path: Path) -> tuple[list[str], list[list[str]], str]:

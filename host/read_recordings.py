@@ -1,18 +1,14 @@
 """Any recording to its stretches on the time grid: text, telemetry, dataflash, CAN logs, the journal."""
 
-from collections import Counter
-from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
+from typing import NoReturn
 
 from bridge.logs import LogReading, read_log
-from firmware_model.sample import Sample
-from host.align import Aligner
-from host.csv_recording import read_csv_recording
+from host.aligned import Messages, aligned, aligned_table, is_of_messages
+from host.csv_recording import read_table, stretches_of
 from host.errors import RecordingError
 from host.journal import JournalReading, read_journal
-from host.recording import NEEDED, Array, Recording, file_sha256, split_at_gaps
+from host.recording import NEEDED, Recording, file_sha256
 from host.vehicle import Vehicle
 
 
@@ -31,81 +27,38 @@ def read_recordings(path: Path, vehicle: Vehicle, needs: tuple[str, ...] = NEEDE
         raise RecordingError(f"{path}: is empty; nothing was recorded")
     suffix = path.suffix.lower()
     if suffix == ".csv":
-        return read_csv_recording(path, vehicle.csv, needs)
-    if suffix == ".jsonl":
-        return _aligned(path, read_journal(path), vehicle, needs)
-    return _aligned(path, read_log(path, vehicle.mavlink, vehicle.can), vehicle, needs)
+        return _of_table(path, vehicle, needs)
+    is_journal = suffix == ".jsonl"
+    reading = read_journal(path) if is_journal else read_log(path, vehicle.mavlink, vehicle.can)
+    messages = Messages(
+        name=path.name,
+        sha256=file_sha256(path),
+        measurements=reading.measurements,
+        counts=reading.counts,
+        notes=tuple(reading.notes),
+        alarms=_alarms(reading),
+    )
+    return aligned(messages, vehicle.alignment, needs) or _refused(path, reading, needs)
 
 
-def _aligned(
-    path: Path, reading: LogReading | JournalReading, vehicle: Vehicle, needs: tuple[str, ...]
-) -> list[Recording]:
-    aligner = Aligner(vehicle.alignment)
-    segments: dict[int, list[Sample]] = {}
-    boots: dict[int, int] = {}
-    seen: Counter[str] = Counter()
-    for measurement in reading.measurements:
-        seen[measurement.quantity.value] += 1
-        segment = aligner.segment  # a push that starts a new segment returns the end of the old one
-        segments.setdefault(segment, []).extend(aligner.push(measurement))
-        boots[aligner.segment] = measurement.boot
-    segments.setdefault(aligner.segment, []).extend(aligner.flush())
-    digest, total = file_sha256(path), reading.counts + aligner.counts
-    pieces = []
-    for segment, samples in segments.items():
-        if not samples:
-            continue
-        whole = _recording(path.name, digest, samples, vehicle.alignment.step, total, tuple(reading.notes))
-        longest = max(1.0, 2.5 * whole.step)
-        whole = replace(
-            whole,
-            rudder=_bridged(whole.rudder, round(longest / whole.step)),
-            alarms=_alarms(reading, boots[segment], samples),
-        )
-        pieces += split_at_gaps(whole, longest, needs)
-    if not pieces:
-        lacking = [name for name in needs if not seen[name]]
-        reason = f"no {' and no '.join(lacking)} in it" if lacking else "never all at once for 10 steps"
-        raise RecordingError(
-            f"{path}: {', '.join(needs)} are needed together: {reason}; "
-            "check the vehicle file's channels (`--vehicle`)"
-        )
-    return pieces
+def _of_table(path: Path, vehicle: Vehicle, needs: tuple[str, ...]) -> list[Recording]:
+    table = read_table(path, vehicle.csv, needs)
+    pieces = aligned_table(table, vehicle.alignment, needs) if is_of_messages(table) else []
+    return pieces or stretches_of(table, path, needs)
 
 
-def _alarms(reading: LogReading | JournalReading, boot: int, samples: list[Sample]) -> tuple[float, ...]:
-    """When `mils run` found a mismatch in this stretch, s from its start."""
+def _alarms(reading: LogReading | JournalReading) -> tuple[tuple[int, int], ...]:
+    """When `mils run` found a mismatch, with the boot it was in."""
     events = reading.events if isinstance(reading, JournalReading) else ()
-    marked = [e.get("t_us") for e in events if e.get("event") == "mismatch" and e.get("boot") == boot]
-    first, last = samples[0].t_us, samples[-1].t_us
-    return tuple(1e-6 * (t_us - first) for t_us in marked if isinstance(t_us, int) and first <= t_us <= last)
+    marked = [(e.get("boot"), e.get("t_us")) for e in events if e.get("event") == "mismatch"]
+    return tuple((boot, at) for boot, at in marked if isinstance(boot, int) and isinstance(at, int))
 
 
-def _bridged(rudder: Array, longest: int) -> Array:
-    """Losses of up to `longest` rows on a straight line: the plane turned on the way, nobody knows when."""
-    rows, known = np.arange(rudder.size), np.isfinite(rudder)
-    before = np.maximum.accumulate(np.where(known, rows, -1))
-    after = np.minimum.accumulate(np.where(known, rows, rudder.size)[::-1])[::-1]
-    is_short = (before >= 0) & (after < rudder.size) & (after - before <= longest + 1)
-    share = (rows - before) / np.maximum(after - before, 1)
-    line = (1.0 - share) * rudder[before] + share * rudder[np.minimum(after, rudder.size - 1)]
-    return np.where(is_short & ~known, line, rudder)
-
-
-def _recording(
-    name: str, sha256: str, samples: list[Sample], step: float, counts: Counter[str], notes: tuple[str, ...]
-) -> Recording:
-    time = np.array([sample.t_us for sample in samples], dtype=float) * 1e-6
-    return Recording(
-        name=name,
-        sha256=sha256,
-        time=time - time[0],
-        depth=np.array([sample.depth for sample in samples]),
-        pitch=np.array([sample.pitch for sample in samples]),
-        rudder=np.array([sample.rudder for sample in samples]),
-        speed=np.array([sample.speed for sample in samples]),
-        pitch_rate=np.array([sample.pitch_rate for sample in samples]),
-        step=step,
-        counts=counts,
-        notes=notes,
+def _refused(path: Path, reading: LogReading | JournalReading, needs: tuple[str, ...]) -> NoReturn:
+    seen = {measurement.quantity.value for measurement in reading.measurements}
+    lacking = [name for name in needs if name not in seen]
+    reason = f"no {' and no '.join(lacking)} in it" if lacking else "never all at once for 10 steps"
+    raise RecordingError(
+        f"{path}: {', '.join(needs)} are needed together: {reason}; "
+        "check the vehicle file's channels (`--vehicle`)"
     )

@@ -41,9 +41,21 @@ EFFECTS = (
         slot="surge",
         parameters=(
             Parameter(
-                name="speed_time", unit="s", lower=0.3, upper=1000, meaning="recovery time of the speed"
+                name="speed_time",
+                unit="s",
+                lower=0.3,
+                upper=1000,
+                meaning="recovery time of the speed",
+                speed_power=-1,
             ),
-            Parameter(name="c_ud", unit="m/s^2/rad^2", lower=0, upper=500, meaning="drag of the plane"),
+            Parameter(
+                name="c_ud",
+                unit="m/s^2/rad^2",
+                lower=0,
+                upper=500,
+                meaning="drag of the plane",
+                speed_power=2,
+            ),
             Parameter(name="c_uq", unit="1", lower=0, upper=20, meaning="heave mass over surge mass"),
         ),
         sentence="The speed falls in manoeuvres: damping falls with it, the plane's force with its square.",

@@ -66,6 +66,7 @@ def _share(side: Side, shape: str, own: str) -> Parameter:
         lower=-1e6,
         upper=1e6,
         meaning="share of the term",
+        speed_power=1,
     )
 
 

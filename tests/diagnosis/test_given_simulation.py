@@ -104,9 +104,12 @@ def test_the_same_hull_at_another_speed_is_the_same() -> None:
         "u0": 1.5,
         "c_wq": 0.6,
         "c_qq": -23.0,
+        "speed_time": 20.0,
+        "c_ud": 12.0,
+        "c_uq": 2.0,
     }
     values |= {"heave_offset": 0.0, "pitch_offset": 0.0}
-    names = frozenset({"heave_pitch_rate_coupling", "pitch_quadratic_damping"})
+    names = frozenset({"heave_pitch_rate_coupling", "pitch_quadratic_damping", "speed_loss"})
     slower = at_speed(
         Side(names=names, values={name: (value, 0.1) for name, value in values.items()}), 1.2
     ).values
@@ -116,6 +119,9 @@ def test_the_same_hull_at_another_speed_is_the_same() -> None:
     assert slower["b2"] == pytest.approx((-1.4 * ratio**2, 0.1 * ratio**2))
     assert slower["a3"] == (-0.5, 0.1)  # weight knows no speed
     assert slower["c_qq"] == (-23.0, 0.1)
+    assert slower["speed_time"] == pytest.approx((20.0 / ratio, 0.1 / ratio))
+    assert slower["c_ud"] == pytest.approx((12.0 * ratio**2, 0.1 * ratio**2))
+    assert slower["c_uq"] == (2.0, 0.1)
     assert slower["u0"][0] == 1.2
 
 
