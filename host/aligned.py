@@ -1,4 +1,8 @@
-"""Asynchronous measurements to recordings: stretches on the grid, cut at restarts and long gaps."""
+"""Asynchronous measurements to recordings: stretches on the grid, cut at restarts and long gaps.
+
+Spikes are left out first: on a line between two messages they would spread over the instants beside them, too
+small there to be told from the motion.
+"""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -9,6 +13,7 @@ import numpy as np
 from bridge.measurement import Measurement, Quantity
 from firmware_model.sample import Sample
 from host.align import AlignConfig, Aligner
+from host.outliers import CHANNELS, outliers, told
 from host.recording import NEEDED, Array, Recording, split_at_gaps
 
 ONE_CHANNEL = 0.5  # of the rows that tell depth: at most so many tell pitch, too, where each has its own
@@ -41,6 +46,7 @@ class _Segment:
 
 def aligned(messages: Messages, config: AlignConfig, needs: tuple[str, ...] = NEEDED) -> list[Recording]:
     """Stretches that have all that is needed; none where that never comes together."""
+    messages = _without_spikes(messages)
     aligner = Aligner(config)
     segments: dict[int, _Segment] = {}
     for measurement in messages.measurements:
@@ -58,6 +64,34 @@ def aligned(messages: Messages, config: AlignConfig, needs: tuple[str, ...] = NE
             whole = replace(whole, rudder=_bridged(whole.rudder, round(longest / config.step)))
             pieces += split_at_gaps(whole, longest, needs)
     return pieces
+
+
+def _without_spikes(messages: Messages) -> Messages:
+    by_channel: dict[tuple[str, int], list[int]] = {}
+    for k, measurement in enumerate(messages.measurements):
+        by_channel.setdefault((measurement.quantity.value, measurement.boot), []).append(k)
+    spikes: set[int] = set()
+    counts: Counter[str] = Counter()
+    for (name, _), places in by_channel.items():
+        if name in CHANNELS:
+            found = _spikes([messages.measurements[k] for k in places])
+            spikes |= {places[k] for k in found}
+            counts[f"outlier.{name}"] += len(found)
+    measured = Counter(measurement.quantity.value for measurement in messages.measurements)
+    notes = [told(name, count, measured[name]) for name in CHANNELS if (count := counts[f"outlier.{name}"])]
+    kept = [one for k, one in enumerate(messages.measurements) if k not in spikes]
+    return replace(
+        messages, measurements=kept, counts=messages.counts + counts, notes=(*messages.notes, *notes)
+    )
+
+
+def _spikes(measurements: list[Measurement]) -> list[int]:
+    """Which of one channel's, but for those that come again or late, which the aligner refuses."""
+    time = np.array([measurement.t_us for measurement in measurements])
+    advancing = np.flatnonzero(np.diff(np.maximum.accumulate(time), prepend=-1) > 0)
+    values = np.array([measurement.value for measurement in measurements])
+    found: list[int] = advancing[outliers(1e-6 * time[advancing], values[advancing])].tolist()
+    return found
 
 
 def is_of_messages(table: Recording) -> bool:

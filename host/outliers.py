@@ -66,11 +66,13 @@ def _told(of_file: list[tuple[Recording, Found]]) -> tuple[Counter[str], list[st
         if count:
             measured = sum(int(np.isfinite(getattr(recording, name)).sum()) for recording, _ in of_file)
             counts[f"outlier.{name}"] = count
-            notes.append(
-                f"{count} of {measured} {name.replace('_', ' ')} values lie off their neighbours "
-                "and were left out"
-            )
+            notes.append(told(name, count, measured))
     return counts, notes
+
+
+def told(name: str, count: int, measured: int) -> str:
+    """The note on a channel's spikes."""
+    return f"{count} of {measured} {name.replace('_', ' ')} values lie off their neighbours and were left out"
 
 
 def outliers(time: Array, values: Array) -> Mask:

@@ -48,6 +48,19 @@ def test_each_channel_is_taken_at_the_grid_from_its_own_times(tmp_path: Path) ->
     assert not recording.has_speed
 
 
+def test_a_spike_is_left_out_before_it_spreads(tmp_path: Path) -> None:
+    path = write(tmp_path / "dive.csv")
+    lines = path.read_text().splitlines()
+    row = next(k for k, line in enumerate(lines) if line.startswith("30.030000,"))
+    lines[row] = "30.030000,22.0,,,,"
+    path.write_text("\n".join(lines) + "\n")
+    (recording,) = read_recordings(path, default_vehicle())
+    known = np.isfinite(recording.depth)
+    np.testing.assert_allclose(recording.depth[known], truth(recording.time)["depth"][known], atol=2e-3)
+    assert recording.counts["outlier.depth"] == 1
+    assert "1 of 600 depth values lie off their neighbours and were left out" in recording.notes
+
+
 def test_it_comes_at_the_step_of_its_pitch_where_that_is_not_the_vehicles(tmp_path: Path) -> None:
     (recording,) = read_recordings(write(tmp_path / "slow.csv", step=0.25), default_vehicle())
     assert recording.step == pytest.approx(0.25)
