@@ -3,7 +3,12 @@
 import casadi as ca
 
 from host.catalogue import weight
+from host.catalogue.gravity import GRAVITY
 from host.equations import Chain, Effect, Parameter
+
+HEAVE_OVER_WEIGHT = 1.9
+"""Mass that a slender hull moves in heave, the water about it included, over its own (Fossen, Handbook of
+Marine Craft Hydrodynamics and Motion Control, ch. 8)."""
 
 
 def _coupling(c: Chain) -> None:
@@ -19,7 +24,10 @@ def _buoyancy(c: Chain) -> None:
 
 
 def _compressibility(c: Chain) -> None:
-    c.heave += weight.compressed(c) * ca.cos(c.theta)
+    lost = weight.compressed(c)
+    c.heave += lost * ca.cos(c.theta)
+    # What rights the hull is its buoyancy, too (which the weight equals, but for little).
+    c.pitch -= HEAVE_OVER_WEIGHT * lost / GRAVITY * c.p["a3"] * ca.sin(c.theta)
 
 
 def _ballast(c: Chain) -> None:
@@ -82,7 +90,7 @@ EFFECTS = (
             ),
         ),
         sentence="Buoyancy changes with depth: the hull or the water is compressed.",
-        equation="w' = ... + c_wz (zeta - neutral_depth) cos theta",
+        equation="w' = ... + c_wz (zeta - neutral_depth) cos theta; a3 ~ buoyancy",
         manoeuvre="long straight runs at the shallowest and the deepest depth of the mission",
         probes=((1e-3, 1.0),),
         scales=("", "depth"),

@@ -217,6 +217,21 @@ def test_a_weight_that_came_off_the_centre_turns_the_hull(time: float, share: fl
     assert moment == pytest.approx(-share * weight * (forward * np.cos(theta) + below * np.sin(theta)))
 
 
+def test_what_a_compressed_hull_loses_of_its_buoyancy_does_not_right_it() -> None:
+    mass, in_heave, below, theta, g = 30.0, 57.0, 0.02, 0.3, 9.80665
+    lost, inertia = 4.0, 10.0  # N, kg m^2
+    structure = structure_of(("depth_dependent_buoyancy",))
+    own = {"a3": -mass * g * below / inertia, "c_wz": lost / in_heave / 12.0, "neutral_depth": 8.0}
+    values = dict.fromkeys(structure.names, 0.0) | own
+    drive = [0.0, 0.0, 0.0, 0.1, 0.0, 0.0]
+    state, parameters = [0.0, 0.0, theta, 20.0], [values[n] for n in structure.names]
+    chain = structure.chain(*map(ca.DM, (state, parameters, drive, 0.0)))
+    force, moment = np.array(ca.evalf(structure.derivative(chain))).ravel()[:2]
+    assert force == pytest.approx(lost * np.cos(theta) / in_heave)
+    change = moment - own["a3"] * theta
+    assert change == pytest.approx(lost * below * np.sin(theta) / inertia, rel=1e-6)
+
+
 @pytest.mark.parametrize("is_speed_known", [0.0, 1.0])
 def test_a_speed_over_the_ground_lacks_what_the_water_moves_along_the_hull(is_speed_known: float) -> None:
     current, speed, theta = 0.3, 1.5, 0.5
