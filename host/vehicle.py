@@ -8,10 +8,10 @@ from typing import Any, Literal
 from bridge.can_map import CanMap
 from bridge.mavlink_map import MavlinkMap
 from firmware_model.config import EstimatorConfig
-from host.align import AlignConfig
-from host.csv_map import CsvMap
-from host.mismatch import MismatchConfig
-from host.state import fingerprint
+from host.live.align import AlignConfig
+from host.live.mismatch import MismatchConfig
+from host.live.state import fingerprint
+from host.recordings.csv_map import CsvMap
 from host.toml_config import MAY_BE_INFINITE, build, read_toml, shared, to_table, to_toml
 
 

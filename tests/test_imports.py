@@ -21,6 +21,28 @@ OWN_FOLDERS = {
     "tools/sitl": ("tools.sitl.",),
     "tools/trial": ("tools.trial.", "tools.sitl."),
 }
+# The folders of ARCHITECTURE.md: each imports only from those above it.
+FOLDERS = (
+    "host",
+    "host.live",
+    "host.recordings",
+    "host.compiled",
+    "host.noise",
+    "host.dynamics",
+    "host.catalogue",
+    "host.likelihood",
+    "host.identification",
+    "host.diagnosis.recordings",
+    "host.diagnosis.fits",
+    "host.diagnosis.search",
+    "host.diagnosis.disturbances",
+    "host.diagnosis.proof",
+    "host.diagnosis",
+    "host.diagnosis.against",
+    "host.diagnosis.told",
+)
+# The vehicle file takes settings from where they are used; the answer holds a comparison.
+UPWARD = {"host.vehicle", "host.diagnosis.answer"}
 
 
 def imported_roots(path: Path) -> set[str]:
@@ -50,3 +72,19 @@ def test_package_imports_only_what_the_map_allows(folder: str) -> None:
                 and not f"{node.module}.".startswith(OWN_FOLDERS[folder])
             }
         assert not foreign, f"{path} imports {foreign}"
+
+
+def folder_of(module: str) -> str:
+    return max((one for one in FOLDERS if f"{module}.".startswith(f"{one}.")), key=len)
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_a_folder_of_host_imports_only_from_those_above_it(folder: str) -> None:
+    above = FOLDERS[: FOLDERS.index(folder) + 1]
+    for path in sorted((ROOT / folder.replace(".", "/")).glob("*.py")):
+        if ".".join(path.relative_to(ROOT).with_suffix("").parts) in UPWARD:
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("host"):
+                modules = {f"{node.module}.{alias.name}" for alias in node.names}
+                assert {folder_of(module) for module in modules} <= set(above), f"{path}: from {node.module}"

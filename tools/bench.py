@@ -13,7 +13,7 @@ from host.errors import MissingExtra, RecordingError
 from host.vehicle import Vehicle, default_vehicle, read_vehicle
 
 if TYPE_CHECKING:
-    from host.recording import Recording
+    from host.recordings.recording import Recording
 
 COUNT = re.compile(r",? \d+/\d+\b")  # "2 effects, 3/20: ..."
 BENCH_MODULES = ("scipy", "casadi", "matplotlib", "jinja2", "rich")
@@ -30,7 +30,7 @@ def require_bench() -> None:
 
 
 def add_leave_out(parser: argparse.ArgumentParser) -> None:
-    """--leave-out: stretches of a recording that are not looked at, to be read by host.left_out."""
+    """--leave-out: stretches of a recording that are not looked at, read by host.recordings.left_out."""
     parser.add_argument(
         "--leave-out",
         default="",
@@ -51,7 +51,7 @@ def read_all(
     needs: tuple[str, ...] = ("depth", "pitch", "rudder"),
 ) -> "list[Recording]":
     """Every stretch of every file. Raises RecordingError when they do not belong together."""
-    from host.read_recordings import read_recordings
+    from host.recordings.read import read_recordings
 
     read: list[Recording] = []
     for path in paths:
@@ -79,7 +79,7 @@ def joint_or_each(
 
 def tell_notes(recordings: "list[Recording]") -> None:
     """What was lost or decided while the files were read, on stderr."""
-    from host.recording import notes_of
+    from host.recordings.recording import notes_of
 
     for note in notes_of(recordings):
         print(f"note: {note}", file=sys.stderr)

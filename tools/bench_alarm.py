@@ -18,10 +18,10 @@ import numpy as np
 from firmware_model.config import EstimatorConfig
 from firmware_model.estimator import make_estimator
 from firmware_model.sample import Sample
-from host.diagnosis.around import LONGEST_SIDE, around_alarm
-from host.mismatch import Mismatch, MismatchConfig, MismatchWatch
-from host.prediction_window import Array, PredictionWindow, Reference
-from host.recording import Recording
+from host.diagnosis.recordings.around import LONGEST_SIDE, around_alarm
+from host.live.mismatch import Mismatch, MismatchConfig, MismatchWatch
+from host.live.prediction_window import Array, PredictionWindow, Reference
+from host.recordings.recording import Recording
 from tools.sitl.effects import Timed
 from tools.sitl.excitation import Excitation
 from tools.sitl.plant import Plant, stream

@@ -12,7 +12,7 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
-from host.machine_code import compiler
+from host.compiled.machine_code import compiler
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -12,8 +12,8 @@ from bridge.logs import read_log
 from bridge.mavlink_encoder import MavlinkEncoder
 from bridge.mavlink_frames import Scanner
 from bridge.measurement import Measurement, Quantity
-from host.csv_recording import read_csv_recording
-from host.journal import read_journal
+from host.live.journal import read_journal
+from host.recordings.csv_recording import read_csv_recording
 from host.vehicle import Vehicle
 
 CAN_SUFFIXES = (".log", ".txt", ".asc", ".blf")

@@ -42,14 +42,14 @@ def heldout_errors(path: Path, names: tuple[str, ...], start: dict[str, float]) 
     import numpy as np
 
     from host.catalogue.kin import OFFSETS
-    from host.diagnosis.explanation import Explanation
-    from host.diagnosis.fitter import Fitter
-    from host.diagnosis.scoring import misfit
-    from host.diagnosis.spans import divide
-    from host.diagnosis.trims import retrimmed
-    from host.gauss_newton import Point
-    from host.noise_floor import noise_floor
-    from host.output_error import output_error
+    from host.diagnosis.fits.explanation import Explanation
+    from host.diagnosis.fits.fitter import Fitter
+    from host.diagnosis.fits.trims import retrimmed
+    from host.diagnosis.proof.scoring import misfit
+    from host.diagnosis.recordings.spans import divide
+    from host.likelihood.gauss_newton import Point
+    from host.likelihood.output_error import output_error
+    from host.noise.noise_floor import noise_floor
 
     spans = divide(recordings)
     fitter = Fitter(spans.teaching)

@@ -19,7 +19,7 @@ from host.catalogue import (
     surge,
     unknown,
 )
-from host.equations import Effect, Structure
+from host.dynamics.equations import Effect, Structure
 
 CATALOGUE: tuple[Effect, ...] = (
     *environment.EFFECTS,  # first: the speed through the water may depend on how that moves

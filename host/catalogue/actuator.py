@@ -3,7 +3,7 @@
 import casadi as ca
 
 from host.catalogue.switching import after, limited
-from host.equations import Chain, Effect, Parameter
+from host.dynamics.equations import Chain, Effect, Parameter
 
 SLIGHT = 1e-12  # share of a sub-step, so that no part of it is empty
 LEAST_MOVED = 1e-9  # rad, of a servo that moves

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from host.catalogue.switching import after
-from host.equations import Chain, Effect, Parameter, Slot, Term
+from host.dynamics.equations import Chain, Effect, Parameter, Slot, Term
 
 Action = Callable[[Chain, ca.SX], None]
 SETTLING = "speed_settling"

@@ -4,7 +4,7 @@ import casadi as ca
 
 from host.catalogue.gravity import GRAVITY
 from host.catalogue.oscillation import oscillation, oscillation_parameters
-from host.equations import Chain, Effect, Parameter
+from host.dynamics.equations import Chain, Effect, Parameter
 
 INTERNAL_PERIODS = (15.0, 20000.0)  # s
 WAVE_PERIODS = (2.0, 20.0)  # s

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from host.equations import Chain, Effect, Parameter
+from host.dynamics.equations import Chain, Effect, Parameter
 
 
 def _steady_damping(c: Chain) -> None:

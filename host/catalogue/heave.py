@@ -4,7 +4,7 @@ import casadi as ca
 
 from host.catalogue import weight
 from host.catalogue.gravity import GRAVITY
-from host.equations import Chain, Effect, Parameter
+from host.dynamics.equations import Chain, Effect, Parameter
 
 HEAVE_OVER_WEIGHT = 1.9
 """Mass that a slender hull moves in heave, the water about it included, over its own (Fossen, Handbook of

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
-from host.equations import Effect
+from host.dynamics.equations import Effect
 
 OFFSETS = ("net_buoyancy", "trim_moment", "rudder_offset", "pitch_bias", "vertical_current")
 """Effects that do no more than shift the steady state, as nuisance.FREE_TRIM does without saying why."""

@@ -9,7 +9,7 @@ import casadi as ca
 
 from host.catalogue import changes
 from host.catalogue.switching import after
-from host.equations import Chain, Effect, Parameter, Slot, Term
+from host.dynamics.equations import Chain, Effect, Parameter, Slot, Term
 
 COUNT = 24
 FIRST, LAST = "moments_first", "moments_last"

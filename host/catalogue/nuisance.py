@@ -1,6 +1,6 @@
 """What hides the physics left out while it is unknown: no catalogue entries, but tools of the search."""
 
-from host.equations import Chain, Effect, Parameter
+from host.dynamics.equations import Chain, Effect, Parameter
 
 
 def _free_trim(c: Chain) -> None:

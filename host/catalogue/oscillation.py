@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from host.equations import Chain, Parameter
+from host.dynamics.equations import Chain, Parameter
 
 
 def oscillation(c: Chain, name: str) -> ca.SX:

@@ -4,7 +4,7 @@ import casadi as ca
 
 from host.catalogue import weight
 from host.catalogue.gravity import GRAVITY
-from host.equations import Chain, Effect, Parameter
+from host.dynamics.equations import Chain, Effect, Parameter
 
 TINY = 1e-9  # m/s, beside a speed that may be nothing
 

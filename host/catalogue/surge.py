@@ -3,7 +3,7 @@
 import casadi as ca
 
 from host.catalogue.weight import net_weight
-from host.equations import Chain, Effect, Parameter
+from host.dynamics.equations import Chain, Effect, Parameter
 
 MINUTE = 60.0  # s
 

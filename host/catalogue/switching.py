@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from host.equations import Chain
+from host.dynamics.equations import Chain
 
 
 def after(c: Chain, moment: ca.SX) -> ca.SX:

@@ -11,7 +11,7 @@ from typing import Literal
 import casadi as ca
 
 from host.catalogue.oscillation import oscillation, oscillation_parameters
-from host.equations import Chain, Effect, Parameter
+from host.dynamics.equations import Chain, Effect, Parameter
 
 Side = Literal["heave", "pitch"]
 SIDES: tuple[Side, Side] = ("heave", "pitch")

@@ -3,7 +3,7 @@
 import casadi as ca
 
 from host.catalogue.switching import after
-from host.equations import Chain
+from host.dynamics.equations import Chain
 
 
 def constant(c: Chain) -> ca.SX:

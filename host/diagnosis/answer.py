@@ -3,10 +3,10 @@
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from host.diagnosis.comparison import Comparison, as_json, sentences
+from host.diagnosis.against.comparison import Comparison, as_json, sentences
 from host.diagnosis.diagnose import Diagnosis
 from host.diagnosis.separation import Separation
-from host.recording import Recording
+from host.recordings.recording import Recording
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

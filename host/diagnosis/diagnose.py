@@ -8,33 +8,33 @@ from typing import NamedTuple
 import numpy as np
 
 from host.catalogue import BY_NAME, UNKNOWN, named
-from host.diagnosis.candidates import eligible
-from host.diagnosis.deviations import deviations
-from host.diagnosis.exchange import twins
+from host.diagnosis.disturbances.seas import Explained, Waves, evidence
 from host.diagnosis.explain import explain
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.leftover import Leftover
-from host.diagnosis.locate import Location, locate
-from host.diagnosis.minute import LEAST_ANGLE, minute_in
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.leftover import Leftover
+from host.diagnosis.fits.sea_fits import WAVES, again_in_waves, again_under_forces, with_regular_waves
+from host.diagnosis.fits.workers import Workers
 from host.diagnosis.plane_choice import Way, is_likelier, likelier_first, ways
-from host.diagnosis.scoring import Misfit, foretells, free_run_errors, misfit
-from host.diagnosis.sea_fits import WAVES, again_in_waves, again_under_forces, with_regular_waves
-from host.diagnosis.search import Search
-from host.diagnosis.seas import Explained, Waves, evidence
-from host.diagnosis.sensed import as_sensed
-from host.diagnosis.spans import Spans, divide, excerpt
-from host.diagnosis.unknown_force import UnknownForce, unknown_force
-from host.diagnosis.unknown_physics import known_in
-from host.diagnosis.usable import check_usable, with_plane_told
-from host.diagnosis.verdict import Verdict, remaining, verdict_on
-from host.diagnosis.whole_vehicle import beside_all, in_the_valley_of, widened
-from host.diagnosis.workers import Workers
-from host.equations import NAMES, Slot
-from host.identifiability import ambiguity
-from host.noise_floor import noise_floor
-from host.outliers import without_outliers
-from host.recording import Array, Recording
+from host.diagnosis.proof.deviations import deviations
+from host.diagnosis.proof.locate import Location, locate
+from host.diagnosis.proof.minute import LEAST_ANGLE, minute_in
+from host.diagnosis.proof.scoring import Misfit, foretells, free_run_errors, misfit
+from host.diagnosis.proof.unknown_force import UnknownForce, unknown_force
+from host.diagnosis.proof.verdict import Verdict, remaining, verdict_on
+from host.diagnosis.recordings.sensed import as_sensed
+from host.diagnosis.recordings.spans import Spans, divide, excerpt
+from host.diagnosis.recordings.usable import check_usable, with_plane_told
+from host.diagnosis.search.candidates import eligible
+from host.diagnosis.search.exchange import twins
+from host.diagnosis.search.search import Search
+from host.diagnosis.search.unknown_physics import known_in
+from host.diagnosis.search.whole_vehicle import beside_all, in_the_valley_of, widened
+from host.dynamics.equations import NAMES, Slot
+from host.identification.identifiability import ambiguity
+from host.noise.noise_floor import noise_floor
+from host.recordings.outliers import without_outliers
+from host.recordings.recording import Array, Recording
 
 HORIZON = 5.0  # s
 MOST_WORTH = 1e9  # of BIC: without some effects the equations run away

@@ -5,18 +5,9 @@ from functools import cached_property
 
 from host.catalogue import UNKNOWN
 from host.catalogue.nuisance import FREE_TRIM
-from host.diagnosis.all_at_sea import again_in_a_swell, in_a_swell, pushed_about
-from host.diagnosis.drifts import again_in_drift, among_drift, in_drift
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.leftover import leftover
-from host.diagnosis.margins import LARGEST_SET, LITTLE, NAMING_MARGIN
-from host.diagnosis.plane_choice import Way
-from host.diagnosis.pruning import leanest
-from host.diagnosis.rarity import told_by_the_usual
-from host.diagnosis.sea_fits import as_filtered
-from host.diagnosis.search import Search
-from host.diagnosis.seas import (
+from host.diagnosis.disturbances.all_at_sea import again_in_a_swell, in_a_swell, pushed_about
+from host.diagnosis.disturbances.drifts import again_in_drift, among_drift, in_drift
+from host.diagnosis.disturbances.seas import (
     Explained,
     again_astray,
     against,
@@ -26,9 +17,18 @@ from host.diagnosis.seas import (
     in_plain_waves,
     led_astray,
 )
-from host.diagnosis.unknown_physics import unknown_in, with_unknown
-from host.diagnosis.workers import Workers
-from host.stability import is_stable
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.leftover import leftover
+from host.diagnosis.fits.margins import LARGEST_SET, LITTLE, NAMING_MARGIN
+from host.diagnosis.fits.sea_fits import as_filtered
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.plane_choice import Way
+from host.diagnosis.search.pruning import leanest
+from host.diagnosis.search.rarity import told_by_the_usual
+from host.diagnosis.search.search import Search
+from host.diagnosis.search.unknown_physics import unknown_in, with_unknown
+from host.identification.stability import is_stable
 
 
 def explain(

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.equations import NAMES
-from host.recording import Array, Recording
+from host.dynamics.equations import NAMES
+from host.recordings.recording import Array, Recording
 
 SHORTEST, LONGEST = 60.0, 120.0  # s
 HARMONICS = 12

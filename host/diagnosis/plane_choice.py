@@ -1,4 +1,4 @@
-"""Whether a plane held its angles between rows or moved on (host.plane_between_rows): asked of the motion."""
+"""Whether a plane held its angles between rows or moved on (host.recordings.plane_between_rows)."""
 
 from collections.abc import Callable
 from math import inf
@@ -7,18 +7,18 @@ from typing import NamedTuple
 import numpy as np
 
 from host.catalogue.nuisance import FREE_TRIM
-from host.diagnosis.explanation import Explanation, Names
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, margin
-from host.diagnosis.outset import at_the_outset, leads_on, pushed_by_forces, says_all
-from host.diagnosis.plain_waves import plain_waves, whole_in_waves
-from host.diagnosis.sea_fits import as_filtered, with_waves
-from host.diagnosis.search import Search
-from host.diagnosis.spans import divide, excerpt
-from host.diagnosis.whole_vehicle import is_real, with_all_ordinary
-from host.diagnosis.workers import Workers
-from host.plane_between_rows import with_moving_plane
-from host.recording import Recording
+from host.diagnosis.disturbances.plain_waves import plain_waves, whole_in_waves
+from host.diagnosis.fits.explanation import Explanation, Names
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, margin
+from host.diagnosis.fits.sea_fits import as_filtered, with_waves
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.recordings.spans import divide, excerpt
+from host.diagnosis.search.outset import at_the_outset, leads_on, pushed_by_forces, says_all
+from host.diagnosis.search.search import Search
+from host.diagnosis.search.whole_vehicle import is_real, with_all_ordinary
+from host.recordings.plane_between_rows import with_moving_plane
+from host.recordings.recording import Recording
 
 FAR_LIKELIER = 1.0  # of BIC a sample: what no search without waves makes up for
 CONTENDERS = 10  # sets that are tried with the plane the other way

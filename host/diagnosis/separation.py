@@ -14,17 +14,17 @@ import numpy as np
 from host.catalogue import BY_NAME
 from host.catalogue.kin import both_come
 from host.diagnosis.diagnose import Diagnosis
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.margins import TWIN_MARGIN
 from host.diagnosis.manoeuvres import Manoeuvre, library
-from host.diagnosis.margins import TWIN_MARGIN
-from host.diagnosis.search import Progress
-from host.equations import NAMES, Effect, Slot
-from host.filter_error import whitened_innovations
-from host.gauss_newton import GaussNewton, Point
-from host.output_error import residuals_at
-from host.propagate import LONGEST_SUBSTEP, Inputs, begun_at, free_run, inputs_of
-from host.recording import Array, Recording, mean_speed
+from host.diagnosis.search.search import Progress
+from host.dynamics.equations import NAMES, Effect, Slot
+from host.dynamics.propagate import LONGEST_SUBSTEP, Inputs, begun_at, free_run, inputs_of
+from host.likelihood.filter_error import whitened_innovations
+from host.likelihood.gauss_newton import GaussNewton, Point
+from host.likelihood.output_error import residuals_at
+from host.recordings.recording import Array, Recording, mean_speed
 
 SEPARATES = 2.0 * TWIN_MARGIN  # predicted chi2 that leaves no doubt after chance had its share
 MOST_FLOWN = 2  # manoeuvres, in simulation

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from host.recording import Array, Recording
+from host.recordings.recording import Array, Recording
 
 BASE = {"a1": -0.63084, "a2": -3.38699, "a3": -8.19858, "b1": 0.41385, "b2": -3.94120, "u0": 2.5}
 RECOVERY, DRAG = 4.0, 8.0  # of the speed, s, and of the plane, m/s^2/rad^2

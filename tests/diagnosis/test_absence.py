@@ -5,12 +5,12 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.catalogue import named
-from host.diagnosis.absence import one_step_without
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.fit import run_away
-from host.gauss_newton import Point
-from host.recording import Array
+from host.diagnosis.fits.absence import one_step_without
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.likelihood.fit import run_away
+from host.likelihood.gauss_newton import Point
+from host.recordings.recording import Array
 
 
 def coupled(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
@@ -55,8 +55,8 @@ def test_a_set_does_no_worse_than_with_a_member_less(
     fitter, both = fitted
     less = fitter.grown(fitter.base, "heave_pitch_rate_coupling", [])
     # A drag that drives instead of braking: from there the search runs away.
-    monkeypatch.setattr("host.diagnosis.starts.probed", lambda *_: [(0.0, np.array([1000.0]))])
-    monkeypatch.setattr("host.diagnosis.starts.may_be_bent", lambda *_: False)
+    monkeypatch.setattr("host.diagnosis.fits.starts.probed", lambda *_: [(0.0, np.array([1000.0]))])
+    monkeypatch.setattr("host.diagnosis.fits.starts.may_be_bent", lambda *_: False)
     more = fitter.polished(fitter.grown(less, "heave_quadratic_drag", []))
     assert more.fit.log_likelihood > both.fit.log_likelihood - 2.0
 

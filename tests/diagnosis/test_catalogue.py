@@ -10,9 +10,9 @@ from hidden_dive import BASE, hidden_dive
 from scipy.integrate import solve_ivp, trapezoid
 
 from host.catalogue import BY_NAME, CATALOGUE, UNKNOWN, structure_of
-from host.propagate import free_run, inputs_of
-from host.recording import Recording
-from host.sensitivities import innovations
+from host.dynamics.propagate import free_run, inputs_of
+from host.dynamics.sensitivities import innovations
+from host.recordings.recording import Recording
 
 NAMES_OF_THE_FORMAT = {
     "heave_pitch_rate_coupling", "heave_quadratic_drag", "net_buoyancy", "depth_dependent_buoyancy",

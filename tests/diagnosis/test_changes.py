@@ -9,20 +9,20 @@ from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import BY_NAME, CATALOGUE, CHANGES, structure_of
 from host.catalogue.moments import COUNT, LAST, SCANS, sizes
-from host.diagnosis.around import around, around_alarm
-from host.diagnosis.candidates import eligible
 from host.diagnosis.diagnose import diagnose
-from host.diagnosis.exchange import exchanged
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.offset_choice import with_lasting_offsets
-from host.diagnosis.prospects import _moments, probed
-from host.diagnosis.search import Search
-from host.diagnosis.spans import divide
-from host.diagnosis.whole_vehicle import all_beside
-from host.diagnosis.workers import Workers
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.prospects import _moments, probed
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.recordings.around import around, around_alarm
+from host.diagnosis.recordings.spans import divide
+from host.diagnosis.search.candidates import eligible
+from host.diagnosis.search.exchange import exchanged
+from host.diagnosis.search.offset_choice import with_lasting_offsets
+from host.diagnosis.search.search import Search
+from host.diagnosis.search.whole_vehicle import all_beside
+from host.dynamics.propagate import free_run, inputs_of
 from host.errors import RecordingError
-from host.propagate import free_run, inputs_of
-from host.recording import Array
+from host.recordings.recording import Array
 
 WHEN, TOLD = 47.0, 66.0  # s
 

@@ -7,11 +7,11 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.catalogue import named
-from host.diagnosis.charges import FOREIGN, HARDLY_CHANGES, RARITY
-from host.diagnosis.deviations import deviations, interval
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.fit import Fit
+from host.diagnosis.fits.charges import FOREIGN, HARDLY_CHANGES, RARITY
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.proof.deviations import deviations, interval
+from host.likelihood.fit import Fit
 
 STALL = frozenset({"rudder_stall"})
 

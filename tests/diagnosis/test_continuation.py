@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from host import straightened
 from host.catalogue import ORDINARY
 from host.catalogue.nuisance import FREE_TRIM
-from host.diagnosis import continuation as module
-from host.diagnosis.continuation import STAGES, continued
-from host.diagnosis.explanation import Explanation, Names
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.search import Search
-from host.diagnosis.workers import Workers
-from host.gauss_newton import Point
-from host.recording import Recording
+from host.diagnosis.fits.explanation import Explanation, Names
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.search import continuation as module
+from host.diagnosis.search.continuation import STAGES, continued
+from host.diagnosis.search.search import Search
+from host.likelihood import straightened
+from host.likelihood.gauss_newton import Point
+from host.recordings.recording import Recording
 
 NAMES = frozenset({*ORDINARY, FREE_TRIM.name})
 BEGUN = NAMES | {"pitch_bias", "vertical_current"}

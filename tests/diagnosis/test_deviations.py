@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from hidden_dive import hidden_dive
 
-from host.diagnosis.deviations import HALF_WIDTH, deviations
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.equations import NAMES
-from host.fit import Fit
-from host.gauss_newton import Point
-from host.output_error import output_error
-from host.uncertainty import covariance
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.proof.deviations import HALF_WIDTH, deviations
+from host.dynamics.equations import NAMES
+from host.identification.uncertainty import covariance
+from host.likelihood.fit import Fit
+from host.likelihood.gauss_newton import Point
+from host.likelihood.output_error import output_error
 
 
 @cache

@@ -10,8 +10,8 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.diagnosis.diagnose import Diagnosis, diagnose
-from host.diagnosis.spans import divide
-from host.noise_floor import noise_floor
+from host.diagnosis.recordings.spans import divide
+from host.noise.noise_floor import noise_floor
 from tools.cli import main
 
 

@@ -8,13 +8,13 @@ import pytest
 
 from host.catalogue import BY_NAME
 from host.catalogue.moments import SCANS
+from host.diagnosis.against.comparison import Comparison, EffectDifference, compare
+from host.diagnosis.against.other_side import side_of
 from host.diagnosis.answer import Against, Answer
-from host.diagnosis.comparison import Comparison, EffectDifference, compare
 from host.diagnosis.diagnose import Diagnosis, NamedEffect
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.other_side import side_of
-from host.diagnosis.report import _dated, write_report
+from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.separation import separations
+from host.diagnosis.told.report import _dated, write_report
 
 
 def page(answer: Answer, tmp_path: Path) -> str:

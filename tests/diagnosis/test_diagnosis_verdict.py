@@ -7,11 +7,11 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.catalogue import structure_of
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.leftover import Leftover
-from host.diagnosis.scoring import Misfit
-from host.diagnosis.verdict import (
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.leftover import Leftover
+from host.diagnosis.proof.scoring import Misfit
+from host.diagnosis.proof.verdict import (
     Verdict,
     beyond_bounds_in,
     beyond_geometry_in,

@@ -9,20 +9,20 @@ import pytest
 from hidden_dive import Extra, hidden_dive, nothing
 
 from host.catalogue import ORDINARY, UNKNOWN
-from host.diagnosis import drifts
 from host.diagnosis.diagnose import diagnose
-from host.diagnosis.drift_fits import beside, drifting
-from host.diagnosis.drifts import again_in_drift, among_drift, in_drift
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.files import write_extended_model
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.leftover import leftover
-from host.diagnosis.scoring import misfit
-from host.diagnosis.search import Search
-from host.diagnosis.seas import Explained
-from host.diagnosis.spans import divide
-from host.diagnosis.workers import Workers
-from host.recording import Array, Recording
+from host.diagnosis.disturbances import drifts
+from host.diagnosis.disturbances.drifts import again_in_drift, among_drift, in_drift
+from host.diagnosis.disturbances.seas import Explained
+from host.diagnosis.fits.drift_fits import beside, drifting
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.leftover import leftover
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.proof.scoring import misfit
+from host.diagnosis.recordings.spans import divide
+from host.diagnosis.search.search import Search
+from host.diagnosis.told.files import write_extended_model
+from host.recordings.recording import Array, Recording
 from host.vehicle import default_vehicle
 
 

@@ -5,12 +5,12 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.catalogue.nuisance import FREE_TRIM
-from host.diagnosis.exchange import _likely, exchanged, twins
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.search import Search
-from host.diagnosis.trims import retrimmed
-from host.diagnosis.workers import Workers
-from host.recording import Array
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.trims import retrimmed
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.search.exchange import _likely, exchanged, twins
+from host.diagnosis.search.search import Search
+from host.recordings.recording import Array
 
 
 def out_of_trim(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001

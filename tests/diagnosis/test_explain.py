@@ -7,11 +7,11 @@ from typing import Any, cast
 import pytest
 
 from host.diagnosis import explain as module
-from host.diagnosis.beam import _is_explained_otherwise, _needs_many
+from host.diagnosis.disturbances.seas import Explained
 from host.diagnosis.explain import _alike, _many_in
-from host.diagnosis.margins import LARGEST_SET, LITTLE
-from host.diagnosis.search import Search
-from host.diagnosis.seas import Explained
+from host.diagnosis.fits.margins import LARGEST_SET, LITTLE
+from host.diagnosis.search.beam import _is_explained_otherwise, _needs_many
+from host.diagnosis.search.search import Search
 
 MANY = frozenset(f"effect {number}" for number in range(LARGEST_SET + 1))
 

@@ -7,13 +7,13 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import structure_of
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.search import Search
-from host.diagnosis.whole_vehicle import whole
-from host.diagnosis.workers import Workers
-from host.propagate import free_run, inputs_of
-from host.recording import Array, Recording
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.search.search import Search
+from host.diagnosis.search.whole_vehicle import whole
+from host.dynamics.propagate import free_run, inputs_of
+from host.recordings.recording import Array, Recording
 
 BOTH = frozenset({"plane_in_cross_flow", "speed_independent_damping"})
 COUPLING = 2.0  # m/s: the hull heaves a third of its speed

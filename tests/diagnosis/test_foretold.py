@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from host.diagnosis.foretold import foretold_errors
-from host.diagnosis.scoring import misfit
-from host.diagnosis.spans import divide
+from host.diagnosis.proof.foretold import foretold_errors
+from host.diagnosis.proof.scoring import misfit
+from host.diagnosis.recordings.spans import divide
 from tests.diagnosis.test_unstable_hull import NOISE, flown
 
 

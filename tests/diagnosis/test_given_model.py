@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hidden_dive import BASE
 
+from host.diagnosis.against.given_model import against_model
 from host.diagnosis.diagnose import Diagnosis
-from host.diagnosis.files import write_extended_model
-from host.diagnosis.given_model import against_model
-from host.equations import NAMES
-from host.model import VehicleModel, read_model
+from host.diagnosis.told.files import write_extended_model
+from host.dynamics.equations import NAMES
+from host.identification.model import VehicleModel, read_model
 from host.vehicle import default_vehicle
 from tools.cli import main
 
@@ -71,7 +71,7 @@ def test_where_forces_act_a_filter_carries_the_model_too(
     def anew(*_: object) -> None:
         raise AssertionError("what was found is carried into each stretch, the model begins anew")
 
-    monkeypatch.setattr("host.diagnosis.scoring.free_run_errors", anew)
+    monkeypatch.setattr("host.diagnosis.proof.scoring.free_run_errors", anew)
     found = replace(coupled, has_sea=True)
     true, lacking = (
         against_model(found, given(found, effects), "m.json").found.base_misfit

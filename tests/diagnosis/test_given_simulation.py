@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from hidden_dive import hidden_dive
 
+from host.diagnosis.against.comparison import Comparison, EffectDifference, sentences
+from host.diagnosis.against.contained import contained
+from host.diagnosis.against.given_simulation import against_simulation, check_same_flight
+from host.diagnosis.against.other_side import Side, at_speed
 from host.diagnosis.answer import Answer
-from host.diagnosis.comparison import Comparison, EffectDifference, sentences
-from host.diagnosis.contained import contained
 from host.diagnosis.diagnose import Diagnosis
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.files import document
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.given_simulation import against_simulation, check_same_flight
-from host.diagnosis.other_side import Side, at_speed
-from host.diagnosis.report import summary
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.told.files import document
+from host.diagnosis.told.report import summary
 from host.errors import RecordingError
-from host.plane_between_rows import with_moving_plane
-from host.recording import Recording
+from host.recordings.plane_between_rows import with_moving_plane
+from host.recordings.recording import Recording
 from tools.cli import main
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from hidden_dive import hidden_dive
 
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.leftover import is_above_floor, leftover
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.leftover import is_above_floor, leftover
 
 
 def test_the_right_model_leaves_nothing_where_all_readings_are_rounded() -> None:

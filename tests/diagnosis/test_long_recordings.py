@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hidden_dive import hidden_dive
 
-from host.diagnosis import spans
 from host.diagnosis.diagnose import diagnose
-from host.recording import Array
+from host.diagnosis.recordings import spans
+from host.recordings.recording import Array
 
 
 def _coupled(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001

@@ -8,8 +8,8 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.diagnosis.diagnose import diagnose
-from host.diagnosis.files import write_extended_model
-from host.recording import Array
+from host.diagnosis.told.files import write_extended_model
+from host.recordings.recording import Array
 from tools.bench import load_vehicle
 
 LAG = 0.8  # s

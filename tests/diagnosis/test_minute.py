@@ -8,12 +8,12 @@ from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import structure_of
 from host.diagnosis.diagnose import diagnose
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.leftover import Leftover
-from host.diagnosis.minute import LEAST_ANGLE, minute_in
-from host.diagnosis.scoring import Misfit
-from host.diagnosis.verdict import Verdict, verdict_on
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.leftover import Leftover
+from host.diagnosis.proof.minute import LEAST_ANGLE, minute_in
+from host.diagnosis.proof.scoring import Misfit
+from host.diagnosis.proof.verdict import Verdict, verdict_on
 
 CLIMB, TURN = abs(BASE["a1"]) * BASE["u0"], abs(BASE["b2"])  # m/s^2 and rad/s^2 a radian
 

@@ -3,10 +3,10 @@
 import pytest
 from hidden_dive import BASE, hidden_dive
 
-from host.diagnosis.comparison import compare
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.other_side import Side, in_words_of, side_of
+from host.diagnosis.against.comparison import compare
+from host.diagnosis.against.other_side import Side, in_words_of, side_of
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
 
 OFFSETS = {"heave_offset": 0.0, "pitch_offset": 0.0}
 

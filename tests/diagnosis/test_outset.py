@@ -12,20 +12,21 @@ from host.catalogue import ALONG_THE_HULL, FAINT, ORDINARY
 from host.catalogue.kin import OFFSETS
 from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
-from host.diagnosis import outset, plane_choice
-from host.diagnosis import search as module
+from host.diagnosis import plane_choice
 from host.diagnosis.diagnose import diagnose
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.margins import LITTLE, MUCH
-from host.diagnosis.outset import DRIVE, FAR_LESS, IN_TIME, LOST, at_the_outset, leads_on
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.margins import LITTLE, MUCH
+from host.diagnosis.fits.trims import retrimmed
+from host.diagnosis.fits.workers import Workers
 from host.diagnosis.plane_choice import Way, likelier_first
-from host.diagnosis.search import Search
-from host.diagnosis.trims import retrimmed
-from host.diagnosis.whole_vehicle import ended
-from host.diagnosis.workers import Workers
-from host.read_recordings import read_recordings
-from host.recording import Array
+from host.diagnosis.search import outset
+from host.diagnosis.search import search as module
+from host.diagnosis.search.outset import DRIVE, FAR_LESS, IN_TIME, LOST, at_the_outset, leads_on
+from host.diagnosis.search.search import Search
+from host.diagnosis.search.whole_vehicle import ended
+from host.recordings.read import read_recordings
+from host.recordings.recording import Array
 from host.vehicle import default_vehicle
 from tools.sitl.recording import write_csv
 from tools.trial.deck import Card

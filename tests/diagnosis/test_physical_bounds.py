@@ -7,9 +7,9 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import BY_NAME, structure_of
-from host.diagnosis.fitter import Fitter
-from host.propagate import free_run, inputs_of
-from host.recording import Array
+from host.diagnosis.fits.fitter import Fitter
+from host.dynamics.propagate import free_run, inputs_of
+from host.recordings.recording import Array
 
 DISSIPATING = {"heave_quadratic_drag": "c_ww", "pitch_quadratic_damping": "c_qq"}
 SLOWING = {"c_ud", "c_uq"}

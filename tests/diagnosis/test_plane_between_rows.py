@@ -11,10 +11,12 @@ from hidden_dive import BASE, hidden_dive
 from scipy.integrate import solve_ivp
 
 from host.diagnosis.diagnose import diagnose
+from host.diagnosis.disturbances.seas import Explained
 from host.diagnosis.explain import explain
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.files import write_extended_model
-from host.diagnosis.fitter import Fitter
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.sea_fits import with_waves
+from host.diagnosis.fits.workers import Workers
 from host.diagnosis.plane_choice import (
     _among_waves,
     _is_whole_likelier,
@@ -22,18 +24,16 @@ from host.diagnosis.plane_choice import (
     is_likelier,
     ways,
 )
-from host.diagnosis.sea_fits import with_waves
-from host.diagnosis.search import Search
-from host.diagnosis.seas import Explained
-from host.diagnosis.workers import Workers
-from host.equations import NAMES
+from host.diagnosis.search.search import Search
+from host.diagnosis.told.files import write_extended_model
+from host.dynamics.equations import NAMES
 from host.errors import RecordingError
-from host.identify import identify
-from host.model import model_of, read_model, write_model
-from host.plane_between_rows import NOTE, with_moving_plane
-from host.predict import predict
-from host.recording import Array, Recording
-from host.simulate import simulate
+from host.identification.identify import identify
+from host.identification.model import model_of, read_model, write_model
+from host.identification.predict import predict
+from host.identification.simulate import simulate
+from host.recordings.plane_between_rows import NOTE, with_moving_plane
+from host.recordings.recording import Array, Recording
 from host.vehicle import default_vehicle
 
 STEP = 0.1  # s

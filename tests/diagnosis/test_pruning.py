@@ -6,12 +6,12 @@ from typing import Any
 import pytest
 from hidden_dive import hidden_dive
 
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.pruning import pruned
-from host.diagnosis.search import Search
-from host.diagnosis.together import with_ordinary
-from host.diagnosis.workers import Workers
-from host.recording import Array
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.search.pruning import pruned
+from host.diagnosis.search.search import Search
+from host.diagnosis.search.together import with_ordinary
+from host.recordings.recording import Array
 
 TRUE = {"heave_pitch_rate_coupling", "pitch_quadratic_damping"}
 
@@ -52,7 +52,7 @@ def test_where_the_fit_without_all_of_them_is_worse_fewer_go(
     fitter: Fitter, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # A forecast that takes what pays for idle, too.
-    monkeypatch.setattr("host.diagnosis.pruning._saved", lambda _, __, members: 100.0 * len(members))
+    monkeypatch.setattr("host.diagnosis.search.pruning._saved", lambda _, __, members: 100.0 * len(members))
     with Workers(fitter, 1) as workers:
         search = search_of(fitter, workers)
         joint = with_ordinary(search, fitter.grown(fitter.base, "heave_pitch_rate_coupling", []))
@@ -63,10 +63,11 @@ def test_where_the_fit_without_all_of_them_is_worse_fewer_go(
 def test_what_improves_it_by_going_alone_goes_at_once_unless_two_do_the_same_work(
     fitter: Fitter, monkeypatch: pytest.MonkeyPatch, are_needed_together: bool
 ) -> None:
-    monkeypatch.setattr("host.diagnosis.pruning._without_the_idle", lambda _, explanation: explanation)
+    monkeypatch.setattr("host.diagnosis.search.pruning._without_the_idle", lambda _, explanation: explanation)
     if are_needed_together:
         monkeypatch.setattr(
-            "host.diagnosis.pruning._lost", lambda whole, fewer: 100.0 * (len(whole.names - fewer.names) > 1)
+            "host.diagnosis.search.pruning._lost",
+            lambda whole, fewer: 100.0 * (len(whole.names - fewer.names) > 1),
         )
     fitted = []
     with Workers(fitter, 1) as workers:

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from hidden_dive import BASE, hidden_dive
 
-from host.diagnosis import rarity
-from host.diagnosis.exchange import twins
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.offset_choice import with_likeliest_offsets, with_one_offset
-from host.diagnosis.rarity import _pays, told_by_the_usual
-from host.diagnosis.search import Search
-from host.diagnosis.whole_vehicle import with_all_ordinary
-from host.diagnosis.workers import Workers
-from host.recording import Array, Recording
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.search import rarity
+from host.diagnosis.search.exchange import twins
+from host.diagnosis.search.offset_choice import with_likeliest_offsets, with_one_offset
+from host.diagnosis.search.rarity import _pays, told_by_the_usual
+from host.diagnosis.search.search import Search
+from host.diagnosis.search.whole_vehicle import with_all_ordinary
+from host.recordings.recording import Array, Recording
 
 SERVO, FILTER = 0.06, 0.5  # s
 

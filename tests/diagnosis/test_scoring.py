@@ -7,15 +7,15 @@ import numpy as np
 from hidden_dive import hidden_dive
 
 from host.catalogue import structure_of
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.scoring import foretells, misfit
-from host.diagnosis.sea_fits import with_sea
-from host.diagnosis.spans import divide
-from host.equations import NAMES
-from host.noise_floor import noise_floor
-from host.propagate import free_run, inputs_of
-from host.recording import Array
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.sea_fits import with_sea
+from host.diagnosis.proof.scoring import foretells, misfit
+from host.diagnosis.recordings.spans import divide
+from host.dynamics.equations import NAMES
+from host.dynamics.propagate import free_run, inputs_of
+from host.noise.noise_floor import noise_floor
+from host.recordings.recording import Array
 
 
 def test_a_run_that_leaves_the_numbers_is_as_far_off_as_can_be() -> None:

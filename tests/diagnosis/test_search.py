@@ -10,24 +10,24 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import CATALOGUE, ORDINARY, structure_of
-from host.diagnosis import beam
-from host.diagnosis import search as module
-from host.diagnosis import together as together_module
-from host.diagnosis.beam import _pair_instead, _with_best_pair
-from host.diagnosis.charges import LONELY, RARITY
-from host.diagnosis.explanation import Explanation, Names
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.margins import LITTLE
-from host.diagnosis.offset_choice import with_offset
-from host.diagnosis.pruning import leanest, pruned
-from host.diagnosis.search import Search
-from host.diagnosis.together import at_once, completed, together, with_ordinary
-from host.diagnosis.unknown_physics import with_unknown
-from host.diagnosis.workers import Task, Workers
-from host.gauss_newton import Point
-from host.output_error import output_error
-from host.propagate import free_run, inputs_of
-from host.recording import Recording
+from host.diagnosis.fits.charges import LONELY, RARITY
+from host.diagnosis.fits.explanation import Explanation, Names
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.margins import LITTLE
+from host.diagnosis.fits.workers import Task, Workers
+from host.diagnosis.search import beam
+from host.diagnosis.search import search as module
+from host.diagnosis.search import together as together_module
+from host.diagnosis.search.beam import _pair_instead, _with_best_pair
+from host.diagnosis.search.offset_choice import with_offset
+from host.diagnosis.search.pruning import leanest, pruned
+from host.diagnosis.search.search import Search
+from host.diagnosis.search.together import at_once, completed, together, with_ordinary
+from host.diagnosis.search.unknown_physics import with_unknown
+from host.dynamics.propagate import free_run, inputs_of
+from host.likelihood.gauss_newton import Point
+from host.likelihood.output_error import output_error
+from host.recordings.recording import Recording
 
 NOISE = np.array([[2e-3], [5e-3]])  # rad, m
 
@@ -103,8 +103,8 @@ def test_of_many_what_had_an_equal_is_exchanged_again_beside_another_member(
         asked.append((best.names, settled))
         return search.tried[buoyant]
 
-    monkeypatch.setattr("host.diagnosis.search.exchanged", exchanged)
-    monkeypatch.setattr("host.diagnosis.search.pruned", lambda _, best: best)
+    monkeypatch.setattr("host.diagnosis.search.search.exchanged", exchanged)
+    monkeypatch.setattr("host.diagnosis.search.search.pruned", lambda _, best: best)
     monkeypatch.setattr(Search, "across", lambda _, explanations: explanations)
     with Workers(fitter, 1) as workers:
         for bic_of_equal, again in ((101.0, [(buoyant, buoyant - {"actuator_lag"})]), (150.0, [])):
@@ -289,8 +289,8 @@ def test_one_form_competes_with_one_effect_that_leaves_much_or_three(
     monkeypatch.setattr(beam, "_needs_many", lambda *_: False)
     monkeypatch.setattr(Search, "_concluded", lambda search: min(search.tried.values(), key=lambda e: e.bic))
     monkeypatch.setattr(Fitter, "excess", lambda *_: left or 2.0)
-    monkeypatch.setattr("host.diagnosis.beam.with_offset", lambda _, sets: sets)
-    monkeypatch.setattr("host.diagnosis.beam.lone_form", lone_form)
+    monkeypatch.setattr("host.diagnosis.search.beam.with_offset", lambda _, sets: sets)
+    monkeypatch.setattr("host.diagnosis.search.beam.lone_form", lone_form)
     with Workers(fitter, 1) as workers:
         found = Search(fitter, workers, lambda _: None, fitter.base, root).run()
     assert asked == ([] if asked_after is None else [asked_after])

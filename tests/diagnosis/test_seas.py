@@ -8,13 +8,8 @@ from hidden_dive import Extra, hidden_dive
 
 from host.catalogue import ORDINARY, structure_of
 from host.diagnosis.diagnose import _judge, _unnamed, diagnose
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.leftover import leftover
-from host.diagnosis.plain_waves import _beside_hull, _follow_the_plane, _linear_in, plain_waves
-from host.diagnosis.sea_fits import with_sea, with_waves
-from host.diagnosis.search import Search
-from host.diagnosis.seas import (
+from host.diagnosis.disturbances.plain_waves import _beside_hull, _follow_the_plane, _linear_in, plain_waves
+from host.diagnosis.disturbances.seas import (
     Explained,
     Waves,
     _of_the_waves,
@@ -24,11 +19,16 @@ from host.diagnosis.seas import (
     explains_more,
     in_plain_waves,
 )
-from host.diagnosis.spans import divide
-from host.diagnosis.trims import retrimmed
-from host.diagnosis.workers import Workers
-from host.recording import Array
-from host.waves import mean_moment
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.leftover import leftover
+from host.diagnosis.fits.sea_fits import with_sea, with_waves
+from host.diagnosis.fits.trims import retrimmed
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.recordings.spans import divide
+from host.diagnosis.search.search import Search
+from host.likelihood.waves import mean_moment
+from host.recordings.recording import Array
 
 
 def in_waves(extra: Extra, carried: float, turned: float) -> Extra:
@@ -82,7 +82,7 @@ def test_a_band_broader_than_that_of_any_sea_is_no_waves(monkeypatch: pytest.Mon
     with Workers(fitter, 1) as workers:
         search = Search(fitter, workers, lambda _: None, base, root)
         assert among_waves(search, base, fitter.base)[2] is not None
-        monkeypatch.setattr("host.waves.BROADEST", 0.001)
+        monkeypatch.setattr("host.likelihood.waves.BROADEST", 0.001)
         assert among_waves(search, base, fitter.base)[2] is None
 
 
@@ -95,7 +95,7 @@ def test_what_swings_may_be_waves_if_it_has_a_period_of_theirs(
 
     fitter = Fitter([hidden_dive(moved, duration=90.0)])
     swinging = fitter.grown(fitter.base, "unknown_swinging_moment", [])
-    monkeypatch.setattr("host.diagnosis.seas.is_sea", lambda _: False)
+    monkeypatch.setattr("host.diagnosis.disturbances.seas.is_sea", lambda _: False)
     said: list[str] = []
     with Workers(fitter, 1) as workers:
         search = Search(fitter, workers, said.append, fitter.base, fitter.root)
@@ -122,7 +122,7 @@ def test_what_only_passes_for_waves_is_none(monkeypatch: pytest.MonkeyPatch) -> 
         assert explains_more(plain, fitter.root)
         assert not explains_more(plain, better)
         coloured = replace(leftover(fitter, waves), is_coloured=True)
-        monkeypatch.setattr("host.diagnosis.seas.leftover", lambda *_: coloured)
+        monkeypatch.setattr("host.diagnosis.disturbances.seas.leftover", lambda *_: coloured)
         doubtful = in_plain_waves(calm, waves)
         assert not doubtful.left.is_nothing  # something else is left among them
     assert plain_waves(Fitter([hidden_dive(duration=60.0)])) is None
@@ -137,11 +137,11 @@ def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> Non
     def follow(bic: float) -> bool:
         return _follow_the_plane(fitter, sea, replace(sea, bic=bic))
 
-    monkeypatch.setattr("host.diagnosis.plain_waves.PARTLY", np.inf)
+    monkeypatch.setattr("host.diagnosis.disturbances.plain_waves.PARTLY", np.inf)
     assert follow(fitter.linear.bic)
     assert not follow(fitter.linear.bic - gain)  # twice as much
     monkeypatch.undo()
-    monkeypatch.setattr("host.diagnosis.plain_waves.MOSTLY", np.inf)
+    monkeypatch.setattr("host.diagnosis.disturbances.plain_waves.MOSTLY", np.inf)
     assert follow(sea.bic - 20.0)  # among white forces a linear hull explains more than that
     assert not follow(sea.bic - 100.0 * gain)
     monkeypatch.undo()
@@ -151,12 +151,12 @@ def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> Non
     sea = with_sea(rough, rough.root)
     hull = _linear_in(rough, sea)
     assert not _follow_the_plane(rough, sea, waves)
-    monkeypatch.setattr("host.diagnosis.plain_waves._follow_the_plane", lambda *_: True)
+    monkeypatch.setattr("host.diagnosis.disturbances.plain_waves._follow_the_plane", lambda *_: True)
     gain = hull.bic - with_waves(rough, hull).bic
     assert gain > 100.0
     assert _beside_hull(rough, hull, 0.9 * gain) is not None  # true waves gain more beside a hull
     assert _beside_hull(rough, hull, 1.1 * gain) is None
-    monkeypatch.setattr("host.diagnosis.plain_waves.NARROW", 0.02)
+    monkeypatch.setattr("host.diagnosis.disturbances.plain_waves.NARROW", 0.02)
     assert plain_waves(rough) is None
 
 

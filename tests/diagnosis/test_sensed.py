@@ -7,9 +7,9 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.diagnosis.diagnose import diagnose
-from host.diagnosis.sensed import USUAL, as_sensed
-from host.noise_floor import noise_floor
-from host.recording import Array
+from host.diagnosis.recordings.sensed import USUAL, as_sensed
+from host.noise.noise_floor import noise_floor
+from host.recordings.recording import Array
 
 
 def coupled(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001

@@ -7,8 +7,8 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.diagnosis.diagnose import Diagnosis
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.manoeuvres import LONGEST, SHORTEST, library
 from host.diagnosis.separation import SEPARATES, _Flight, separations
 

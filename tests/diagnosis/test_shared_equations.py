@@ -9,13 +9,13 @@ from test_under_forces import SEVERAL, real_hull
 
 from host.catalogue import structure_of
 from host.catalogue.nuisance import FREE_TRIM
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.shared_equations import CARRIED, in_shared_equations
-from host.filter_error import filter_error_from
-from host.fit import Fit
-from host.gauss_newton import Point
-from host.output_error import output_error
-from host.waves import in_waves_from
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.shared_equations import CARRIED, in_shared_equations
+from host.likelihood.filter_error import filter_error_from
+from host.likelihood.fit import Fit
+from host.likelihood.gauss_newton import Point
+from host.likelihood.output_error import output_error
+from host.likelihood.waves import in_waves_from
 
 WITH_STATES = ("actuator_lag", "drag_along_the_hull")
 

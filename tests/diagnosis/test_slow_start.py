@@ -5,10 +5,10 @@ import pytest
 
 from host.catalogue import structure_of
 from host.diagnosis.diagnose import diagnose
-from host.fit import Fit
-from host.gauss_newton import Point
-from host.output_error import output_error
-from host.propagate import begun_at, inputs_of
+from host.dynamics.propagate import begun_at, inputs_of
+from host.likelihood.fit import Fit
+from host.likelihood.gauss_newton import Point
+from host.likelihood.output_error import output_error
 from tests.diagnosis.hidden_dive import BASE, DRAG, RECOVERY, slowing
 
 STRUCTURE = structure_of(("speed_loss",))

@@ -8,17 +8,17 @@ import pytest
 
 from host.catalogue import structure_of
 from host.catalogue.nuisance import SPEED_CORRECTION
-from host.diagnosis.comparison import compare
+from host.diagnosis.against.comparison import compare
+from host.diagnosis.against.given_model import against_model
+from host.diagnosis.against.other_side import Side, side_of
 from host.diagnosis.diagnose import diagnose
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.files import write_extended_model
-from host.diagnosis.fitter import SURGE, Fitter
-from host.diagnosis.given_model import against_model
-from host.diagnosis.other_side import Side, side_of
-from host.diagnosis.unknown_physics import known_in
-from host.model import read_model
-from host.propagate import free_run, inputs_of
-from host.recording import Array
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import SURGE, Fitter
+from host.diagnosis.search.unknown_physics import known_in
+from host.diagnosis.told.files import write_extended_model
+from host.dynamics.propagate import free_run, inputs_of
+from host.identification.model import read_model
+from host.recordings.recording import Array
 from host.vehicle import default_vehicle
 from tests.diagnosis.hidden_dive import BASE, DRAG, RECOVERY, slowing
 

@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.speed_forces import are_by_speed
-from host.filter_error import filter_error
-from host.fit import Fit
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.speed_forces import are_by_speed
+from host.likelihood.filter_error import filter_error
+from host.likelihood.fit import Fit
 from tests.diagnosis.hidden_dive import BASE, hidden_dive
 
 SPEED_NOISE = 0.05  # m/s

@@ -8,17 +8,16 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import named, structure_of
-from host.diagnosis.deviations import deviations
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.prospects import probed, whitened_at
-from host.diagnosis.starts import SLUGGISH, with_other_moments, with_usual_heave, with_usual_pitch
-from host.fit import Fit
-from host.gauss_newton import Point
-from host.output_error import output_error
-from host.propagate import free_run, inputs_of
-from host.recording import Array, Recording
-from host.valleys import (
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.prospects import probed, whitened_at
+from host.diagnosis.fits.starts import SLUGGISH, with_other_moments, with_usual_heave, with_usual_pitch
+from host.diagnosis.proof.deviations import deviations
+from host.dynamics.propagate import free_run, inputs_of
+from host.likelihood.fit import Fit
+from host.likelihood.gauss_newton import Point
+from host.likelihood.output_error import output_error
+from host.likelihood.valleys import (
     has_usual_heave,
     other_valleys,
     with_depth_lag_swapped,
@@ -26,6 +25,7 @@ from host.valleys import (
     with_poles_swapped,
     with_stall_moved,
 )
+from host.recordings.recording import Array, Recording
 
 AT_REST = np.array([0.0, 0.0, 0.0, 20.0, 0.0])
 WEAKENED_AT = 31.3  # under a large plane angle, so that the recording can tell
@@ -120,7 +120,7 @@ def test_a_search_far_below_its_goal_is_given_up(monkeypatch: pytest.MonkeyPatch
 
     fitter = Fitter([hidden_dive(lamed)])
     right = fitter.polished(fitter.grown(fitter.base, "rudder_effectiveness_change", []))
-    monkeypatch.setattr("host.diagnosis.fitter.output_error", counted)
+    monkeypatch.setattr("host.diagnosis.fits.fitter.output_error", counted)
     iterations = {}
     for goal in (None, right.fit):
         spent: list[Fit] = []
@@ -258,7 +258,7 @@ def test_a_plane_thought_to_push_the_wrong_way_is_turned_round(monkeypatch: pyte
     rng = np.random.default_rng(2)
     noise = np.array([[2e-3], [4e-3]]) * rng.standard_normal((2, rows.time.size))
     fitter = Fitter([replace(rows, pitch=pitch + noise[0], depth=depth + noise[1])])
-    monkeypatch.setattr("host.diagnosis.starts.may_be_bent", lambda *_: False)
+    monkeypatch.setattr("host.diagnosis.fits.starts.may_be_bent", lambda *_: False)
     wrong = fitter.base.fit.parameters.copy()
     wrong[[0, 3]] = -0.8, -0.05
     parent = Explanation(fitter.base.names, replace(fitter.base.fit, parameters=wrong), fitter.base.bic)
@@ -354,7 +354,7 @@ def test_a_base_without_a_usual_heave_is_no_place_to_begin(
         return 0.8 * x[1], 0.0, 0.0
 
     fitter = Fitter([hidden_dive(coupled)])
-    monkeypatch.setattr("host.diagnosis.starts.may_be_bent", lambda *_: False)
+    monkeypatch.setattr("host.diagnosis.fits.starts.may_be_bent", lambda *_: False)
     bent = fitter.base.fit.parameters.copy()
     bent[[0, 3]] = a1, b1
     parent = Explanation(fitter.base.names, replace(fitter.base.fit, parameters=bent), fitter.base.bic)
@@ -404,7 +404,7 @@ def test_a_slow_plane_is_found_where_the_base_took_it_for_a_slow_hull(
     assert root.fit.parameters[1] > SLUGGISH
     # From a plane so quick that its limit makes no difference no fit comes back.
     quick = fitter.point(root.names | {name}, root, name, np.array([50.0]))
-    monkeypatch.setattr("host.diagnosis.fitter.starts_of", lambda *_: [quick])
+    monkeypatch.setattr("host.diagnosis.fits.fitter.starts_of", lambda *_: [quick])
     found = fitter.grown(root, name, [])
     values = dict(zip(found.fit.structure.names, found.fit.parameters, strict=True))
     assert values["plane_rate"] == pytest.approx(0.0063, rel=0.03)

@@ -9,16 +9,16 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import structure_of
-from host.diagnosis import together as module
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.margins import MUCH
-from host.diagnosis.search import Search
-from host.diagnosis.together import at_once, completed, together
-from host.diagnosis.workers import Workers
-from host.gauss_newton import Point
-from host.output_error import output_error
-from host.propagate import free_run, inputs_of
-from host.valleys import with_poles_swapped
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.margins import MUCH
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.search import together as module
+from host.diagnosis.search.search import Search
+from host.diagnosis.search.together import at_once, completed, together
+from host.dynamics.propagate import free_run, inputs_of
+from host.likelihood.gauss_newton import Point
+from host.likelihood.output_error import output_error
+from host.likelihood.valleys import with_poles_swapped
 
 AT_REST = np.array([0.0, 0.0, 0.0, 20.0, 0.0])
 

@@ -8,23 +8,25 @@ from hidden_dive import hidden_dive
 from test_seas import in_waves
 
 from host.catalogue import FAINT, ORDINARY
-from host.diagnosis import all_at_sea, explain, outset, plane_choice, seas
-from host.diagnosis.all_at_sea import in_a_swell, pushed_about
+from host.diagnosis import explain, plane_choice
+from host.diagnosis.disturbances import all_at_sea, seas
+from host.diagnosis.disturbances.all_at_sea import in_a_swell, pushed_about
+from host.diagnosis.disturbances.plain_waves import plain_waves, whole_in_waves
+from host.diagnosis.disturbances.seas import Explained, Waves, again_astray
 from host.diagnosis.explain import _begun_with_all
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.leftover import leftover
-from host.diagnosis.outset import at_the_outset, pushed_by_forces
-from host.diagnosis.plain_waves import plain_waves, whole_in_waves
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.leftover import leftover
+from host.diagnosis.fits.sea_fits import with_sea, with_waves
+from host.diagnosis.fits.under_forces import climbed
+from host.diagnosis.fits.workers import Workers
 from host.diagnosis.plane_choice import Way, _in_a_swell
-from host.diagnosis.sea_fits import with_sea, with_waves
-from host.diagnosis.search import Search
-from host.diagnosis.seas import Explained, Waves, again_astray
-from host.diagnosis.under_forces import climbed
-from host.diagnosis.whole_vehicle import is_real
-from host.diagnosis.workers import Workers
-from host.gauss_newton import Point
-from host.recording import Array
+from host.diagnosis.search import outset
+from host.diagnosis.search.outset import at_the_outset, pushed_by_forces
+from host.diagnosis.search.search import Search
+from host.diagnosis.search.whole_vehicle import is_real
+from host.likelihood.gauss_newton import Point
+from host.recordings.recording import Array
 
 SEVERAL = (
     "heave_pitch_rate_coupling",

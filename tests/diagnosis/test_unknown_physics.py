@@ -9,19 +9,19 @@ from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import BY_NAME, UNKNOWN, named, structure_of
 from host.catalogue.unknown import AS_OF_PLANE, FORMS
-from host.diagnosis import beam
 from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import diagnose
-from host.diagnosis.files import write_extended_model
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.lone_form import likely_forms, lone_form
-from host.diagnosis.prospects import form_gains, gain
-from host.diagnosis.report import summary
-from host.diagnosis.search import Search
-from host.diagnosis.workers import Workers
-from host.equations import Effect
-from host.model import read_model
-from host.predict import predict
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.prospects import form_gains, gain
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.search import beam
+from host.diagnosis.search.lone_form import likely_forms, lone_form
+from host.diagnosis.search.search import Search
+from host.diagnosis.told.files import write_extended_model
+from host.diagnosis.told.report import summary
+from host.dynamics.equations import Effect
+from host.identification.model import read_model
+from host.identification.predict import predict
 from host.vehicle import vehicle_from_table
 
 

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from host.catalogue import structure_of
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import SLIGHT, Fitter
-from host.diagnosis.leftover import leftover
-from host.diagnosis.search import FAR_LIKELIER, LOST, Search
-from host.diagnosis.seas import Explained, again_astray, led_astray
-from host.diagnosis.speed_forces import densities
-from host.diagnosis.workers import Workers
-from host.gauss_newton import Point
-from host.output_error import output_error
-from host.propagate import free_run, inputs_of
+from host.diagnosis.disturbances.seas import Explained, again_astray, led_astray
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import SLIGHT, Fitter
+from host.diagnosis.fits.leftover import leftover
+from host.diagnosis.fits.speed_forces import densities
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.search.search import FAR_LIKELIER, LOST, Search
+from host.dynamics.propagate import free_run, inputs_of
+from host.likelihood.gauss_newton import Point
+from host.likelihood.output_error import output_error
 from tests.diagnosis.hidden_dive import hidden_dive
 
 NAMES = frozenset(

@@ -8,9 +8,9 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.diagnosis.diagnose import diagnose
-from host.diagnosis.usable import with_plane_told
+from host.diagnosis.recordings.usable import with_plane_told
 from host.errors import RecordingError
-from host.recording import Recording
+from host.recordings.recording import Recording
 
 
 def still(recording: Recording) -> Recording:

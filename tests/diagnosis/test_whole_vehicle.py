@@ -8,10 +8,11 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import FAINT, ORDINARY, structure_of
-from host.diagnosis.explanation import Explanation
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.search import Search
-from host.diagnosis.whole_vehicle import (
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.search.search import Search
+from host.diagnosis.search.whole_vehicle import (
     beside_all,
     in_the_valley_of,
     is_real,
@@ -19,12 +20,11 @@ from host.diagnosis.whole_vehicle import (
     widened,
     with_all_ordinary,
 )
-from host.diagnosis.workers import Workers
-from host.gauss_newton import Point
-from host.output_error import output_error
-from host.recording import Array, Recording
-from host.uncertainty import covariance
-from host.valleys import with_poles_swapped
+from host.identification.uncertainty import covariance
+from host.likelihood.gauss_newton import Point
+from host.likelihood.output_error import output_error
+from host.likelihood.valleys import with_poles_swapped
+from host.recordings.recording import Array, Recording
 
 FEW = ("heave_pitch_rate_coupling", "munk_moment")
 TURNED = {"c_wq": 0.8, "c_qw": 1.0}

@@ -6,14 +6,14 @@ import sys
 import pytest
 from hidden_dive import hidden_dive
 
-from host.diagnosis.fitter import Fitter
-from host.diagnosis.sea_fits import with_sea
-from host.diagnosis.workers import Workers
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.sea_fits import with_sea
+from host.diagnosis.fits.workers import Workers
 
 KILLED = """
 import multiprocessing, os, signal
 from concurrent.futures import ProcessPoolExecutor
-from host.diagnosis.workers import leave_with_parent
+from host.diagnosis.fits.workers import leave_with_parent
 
 if __name__ == "__main__":
     pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), leave_with_parent)

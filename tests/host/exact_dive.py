@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from host.recording import Array, Recording
+from host.recordings.recording import Array, Recording
 
 TABLE_1 = {"a1": -0.63084, "a2": -3.38699, "a3": -8.19858, "b1": 0.41385, "b2": -3.94120, "u0": 2.5}
 """The paper's vehicle (Table 1 with u0 = 2.5 m/s)."""

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from host.afloat import under_water
-from host.read_recordings import read_recordings
-from host.recording import Array, Recording
+from host.recordings.afloat import under_water
+from host.recordings.read import read_recordings
+from host.recordings.recording import Array, Recording
 from host.vehicle import default_vehicle, read_vehicle
 
 STEP = 0.2  # s

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from bridge.measurement import Measurement, Quantity
 from firmware_model.sample import Sample
-from host.align import AlignConfig, Aligner
+from host.live.align import AlignConfig, Aligner
 
 DEPTH, PITCH, RUDDER = Quantity.DEPTH, Quantity.PITCH, Quantity.RUDDER
 STEP_US = 100_000

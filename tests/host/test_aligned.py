@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from host.errors import RecordingError
-from host.read_recordings import read_recordings
-from host.recording import Array
+from host.recordings.read import read_recordings
+from host.recordings.recording import Array
 from host.vehicle import default_vehicle
 
 HEADER = "time_s,depth_m,pitch_rad,rudder_rad,speed_mps,pitch_rate_radps"

@@ -2,7 +2,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from host.all_rows import MOST_ROWS, AllRows
+from host.compiled.all_rows import MOST_ROWS, AllRows
 
 
 def test_every_operation_equals_casadi_s() -> None:
@@ -42,7 +42,7 @@ def test_it_is_the_same_without_a_compiler(monkeypatch: pytest.MonkeyPatch) -> N
     every = AllRows(ca.Function("both", [x, p], [matrix, x[0] + p[1]]))
     rows, parameters = np.random.default_rng(1).normal(size=(3, 150)), np.array([0.7, -1.3])
     with_one = every(rows, parameters)
-    monkeypatch.setattr("host.all_rows._compiled", lambda: None)
+    monkeypatch.setattr("host.compiled.all_rows._compiled", lambda: None)
     for one, other in zip(with_one, every(rows, parameters), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-15)
 
@@ -54,7 +54,7 @@ def test_only_what_is_asked_for_is_worked_out(has_compiler: bool, monkeypatch: p
     every = AllRows(ca.Function("slopes", [x, p], [ca.jacobian(value, x), ca.jacobian(value, p)]))
     rows, parameters = np.random.default_rng(2).normal(size=(2, 70)), np.array([0.7, -1.3, 0.4, 0.2])
     if not has_compiler:
-        monkeypatch.setattr("host.all_rows._compiled", lambda: None)
+        monkeypatch.setattr("host.compiled.all_rows._compiled", lambda: None)
     by_x, by_p = every(rows, parameters)
     few = every.with_columns(1, (1, 3))
     assert len(few._program) < len(every._program)

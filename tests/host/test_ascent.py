@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import host.ascent
-from host.ascent import ascend, place
+import host.likelihood.ascent
 from host.catalogue import structure_of
-from host.filter_error import RandomForces
-from host.gauss_newton import GaussNewton, Point
-from host.propagate import inputs_of
+from host.dynamics.propagate import inputs_of
+from host.likelihood.ascent import ascend, place
+from host.likelihood.filter_error import RandomForces
+from host.likelihood.gauss_newton import GaussNewton, Point
 from tests.diagnosis.hidden_dive import BASE, hidden_dive
 
 STRUCTURE = structure_of(("heave_quadratic_drag", "munk_moment", "pitch_quadratic_damping"))  # no coupling
@@ -49,7 +49,7 @@ def test_the_score_by_differences_is_the_slope_of_the_likelihood() -> None:
     model, point = unstable(0.97)
     here = place(point, model)
     fixed = GaussNewton(model.whitened(point, here.passes), point, FREE)
-    step = host.ascent._scored(here, model, fixed)
+    step = host.likelihood.ascent._scored(here, model, fixed)
     for k, index in enumerate(np.flatnonzero(FREE)):
         stride, ends = 1e-4 * abs(point.parameters[index]), []
         for sign in (1.0, -1.0):

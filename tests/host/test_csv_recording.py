@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from host.csv_map import CsvColumn, CsvMap
-from host.csv_recording import read_csv_recording
 from host.errors import RecordingError
+from host.recordings.csv_map import CsvColumn, CsvMap
+from host.recordings.csv_recording import read_csv_recording
 
 HEADER = "time_s,depth_m,pitch_rad,rudder_rad"
 

@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from host import gauss_newton
-from host import output_error as subject
 from host.catalogue import CATALOGUE, structure_of
-from host.equations import Effect
-from host.gauss_newton import Point
-from host.output_error import output_error
-from host.propagate import free_run, inputs_of
-from host.recording import Recording
-from host.straightened import PREFIXES, slopes, stepped
+from host.dynamics.equations import Effect
+from host.dynamics.propagate import free_run, inputs_of
+from host.likelihood import gauss_newton
+from host.likelihood import output_error as subject
+from host.likelihood.gauss_newton import Point
+from host.likelihood.output_error import output_error
+from host.likelihood.straightened import PREFIXES, slopes, stepped
+from host.recordings.recording import Recording
 
 # A lag of the servo and a moment of heave: pitch damping, restoring and plane moment can rise together.
 TRUTH = {

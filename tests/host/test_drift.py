@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from host.drift import NOTHING, Drift, Whitening, log_likelihood
-from host.drift_levels import OF_DEPTH, OF_PITCH, SENSOR, WATER, likeliest_drift
-from host.recording import Array
+from host.noise.drift import NOTHING, Drift, Whitening, log_likelihood
+from host.noise.drift_levels import OF_DEPTH, OF_PITCH, SENSOR, WATER, likeliest_drift
+from host.recordings.recording import Array
 
 ROWS = 240
 STEPS = np.random.default_rng(1).choice([0.1, 0.2, 1.0], ROWS)  # s

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
 from host.catalogue import structure_of
-from host.gauss_newton import GaussNewton, Point, whiten
+from host.likelihood.gauss_newton import GaussNewton, Point, whiten
 
 STRUCTURE = structure_of(("heave_quadratic_drag", "large_angle_kinematics"))
 NAMES = list(STRUCTURE.names)

@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 from exact_dive import TABLE_1, Dive, fly
 
-from host.equations import BASE, NAMES
-from host.gauss_newton import Point
-from host.identifiability import ambiguity, open_combinations, undetermined
-from host.identify import identify
-from host.maximum_likelihood import fit_maximum_likelihood
-from host.output_error import output_error
-from host.propagate import inputs_of
-from host.recording import Array, Recording
-from host.uncertainty import covariance, covariance_within
+from host.dynamics.equations import BASE, NAMES
+from host.dynamics.propagate import inputs_of
+from host.identification.identifiability import ambiguity, open_combinations, undetermined
+from host.identification.identify import identify
+from host.identification.uncertainty import covariance, covariance_within
+from host.likelihood.gauss_newton import Point
+from host.likelihood.maximum_likelihood import fit_maximum_likelihood
+from host.likelihood.output_error import output_error
+from host.recordings.recording import Array, Recording
 from host.vehicle import default_vehicle
 
 

@@ -9,19 +9,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from host.equations import BASE
-from host.gauss_newton import Point
-from host.interval_likelihood import (
+from host.dynamics.equations import BASE
+from host.dynamics.propagate import inputs_of
+from host.identification.uncertainty import covariance
+from host.likelihood.gauss_newton import Point
+from host.likelihood.interval_likelihood import (
     LEAST_DEVIATION,
     likeliest_deviation,
     log_probability,
     score_and_information,
 )
-from host.maximum_likelihood import fit_maximum_likelihood
-from host.noise_floor import resolution
-from host.output_error import free_run_cost, output_error
-from host.propagate import inputs_of
-from host.uncertainty import covariance
+from host.likelihood.maximum_likelihood import fit_maximum_likelihood
+from host.likelihood.output_error import free_run_cost, output_error
+from host.noise.noise_floor import resolution
 
 STEP = 0.1
 ERRORS = np.linspace(-0.4, 0.4, 161)

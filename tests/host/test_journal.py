@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from bridge.measurement import Measurement, Quantity
 from host.errors import HostError, RecordingError
-from host.journal import Journal, read_journal
+from host.live.journal import Journal, read_journal
 
 ROOT = Path(__file__).parents[2]
 
@@ -140,7 +140,7 @@ def test_a_lost_medium_is_said_when_it_is_synced(tmp_path: Path, monkeypatch: py
     def broken(_: int) -> None:
         raise OSError(5, "Input/output error")
 
-    monkeypatch.setattr("host.journal.os.fsync", broken)
+    monkeypatch.setattr("host.live.journal.os.fsync", broken)
     journal.sync()
     journal.sync()
     assert len(warnings) == 1

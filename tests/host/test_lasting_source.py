@@ -7,7 +7,7 @@ import pytest
 
 from bridge.errors import LinkClosed, LinkError
 from bridge.measurement import Measurement, Quantity
-from host.lasting_source import LastingSource
+from host.live.lasting_source import LastingSource
 
 
 class Time:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from host.errors import RecordingError
-from host.left_out import spans_in, without
-from host.recording import Recording
+from host.recordings.left_out import spans_in, without
+from host.recordings.recording import Recording
 
 
 def recording(name: str = "survey.csv", rows: int = 600) -> Recording:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from host import library_shelf
-from host.library_shelf import folder, keep, place_of
+from host.compiled import library_shelf
+from host.compiled.library_shelf import folder, keep, place_of
 
 
 @pytest.fixture

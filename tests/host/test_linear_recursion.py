@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from host import linear_recursion as module
-from host.linear_recursion import linear_recursion
+from host.compiled import linear_recursion as module
+from host.compiled.linear_recursion import linear_recursion
 
 RANDOM = np.random.default_rng(3)
 SHAPES = [(1, 4, 7, 3), (2, 1, 1, 1), (300, 6, 14, 10), (50, 5, 9, 9), (50, 5, 9, 0)]

@@ -11,9 +11,9 @@ import pytest
 
 from bridge.errors import LinkClosed
 from bridge.measurement import Measurement, Quantity
-from host.journal import Journal, JournalReading, read_journal
-from host.live import LiveLoop, Progress
-from host.state import save_state
+from host.live.journal import Journal, JournalReading, read_journal
+from host.live.loop import LiveLoop, Progress
+from host.live.state import save_state
 from host.vehicle import Vehicle, effective_table, vehicle_from_table
 
 H = 0.1

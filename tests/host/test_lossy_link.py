@@ -8,7 +8,7 @@ from bridge.measurement import Measurement, Quantity
 from firmware_model.config import EstimatorConfig
 from firmware_model.estimate import Estimate
 from firmware_model.estimator import make_estimator
-from host.align import AlignConfig, Aligner
+from host.live.align import AlignConfig, Aligner
 
 STEP = 0.1
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from exact_dive import TABLE_1, Dive, fly
 
-from host import library_shelf, machine_code, over_rows
 from host.catalogue import BY_NAME
-from host.equations import Structure
-from host.kalman import kalman_pass
-from host.machine_code import as_machine_code
-from host.propagate import free_run, inputs_of
-from host.recording import Array
+from host.compiled import library_shelf, machine_code, over_rows
+from host.compiled.machine_code import as_machine_code
+from host.dynamics.equations import Structure
+from host.dynamics.propagate import free_run, inputs_of
+from host.likelihood.kalman import kalman_pass
+from host.recordings.recording import Array
 
 needs_compiler = pytest.mark.skipif(machine_code.compiler() is None, reason="no C compiler here")
 NOISE = np.array([3e-6, 1e-4, 0.02, 0.05])

@@ -4,13 +4,13 @@ from exact_dive import TABLE_1, Dive, fly
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from host.equations import NAMES
-from host.identifiability import undetermined
-from host.maximum_likelihood import fit_maximum_likelihood
-from host.output_error import RUNAWAY, diverges
-from host.propagate import free_run, inputs_of
-from host.sensitivities import innovations
-from host.uncertainty import covariance
+from host.dynamics.equations import NAMES
+from host.dynamics.propagate import free_run, inputs_of
+from host.dynamics.sensitivities import innovations
+from host.identification.identifiability import undetermined
+from host.identification.uncertainty import covariance
+from host.likelihood.maximum_likelihood import fit_maximum_likelihood
+from host.likelihood.output_error import RUNAWAY, diverges
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 

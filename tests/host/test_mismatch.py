@@ -17,9 +17,9 @@ from bridge.measurement import Measurement, Quantity
 from firmware_model.config import EstimatorConfig
 from firmware_model.sample import Sample
 from host.errors import ConfigError
-from host.journal import read_journal
-from host.mismatch import SLOTS, Mismatch, MismatchConfig, MismatchWatch
-from host.prediction_window import NAMES, PredictionWindow, Reference, read_reference, reference_of
+from host.live.journal import read_journal
+from host.live.mismatch import SLOTS, Mismatch, MismatchConfig, MismatchWatch
+from host.live.prediction_window import NAMES, PredictionWindow, Reference, read_reference, reference_of
 
 H = 0.1
 VEHICLE = Reference(a1=-0.63, a2=-3.39, a3=-8.2, b1=0.41, b2=-3.94, u0=2.5)

@@ -3,9 +3,9 @@ from pathlib import Path
 
 import pytest
 
-from host.equations import NAMES
+from host.dynamics.equations import NAMES
 from host.errors import RecordingError
-from host.model import VehicleModel, read_model, write_model
+from host.identification.model import VehicleModel, read_model, write_model
 
 
 def model() -> VehicleModel:

@@ -8,17 +8,17 @@ import pytest
 from exact_dive import TABLE_1, Dive, fly
 from scipy.signal import lfilter
 
-from host.ascent import _Scoring, place
-from host.coloured_noise import WanderingSensors, coloured_noise
-from host.filter_error import RandomForces, filter_error
-from host.gauss_newton import Point
-from host.identify import identify
-from host.kalman import KalmanPass
-from host.maximum_likelihood import fit_maximum_likelihood
-from host.propagate import free_run, inputs_of
-from host.uncertainty import covariance
+from host.dynamics.propagate import free_run, inputs_of
+from host.identification.identify import identify
+from host.identification.uncertainty import covariance
+from host.likelihood.ascent import _Scoring, place
+from host.likelihood.coloured_noise import WanderingSensors, coloured_noise
+from host.likelihood.filter_error import RandomForces, filter_error
+from host.likelihood.gauss_newton import Point
+from host.likelihood.kalman import KalmanPass
+from host.likelihood.maximum_likelihood import fit_maximum_likelihood
+from host.likelihood.waves import SHAPE, in_waves, in_waves_from, is_sea, passes_in_waves, whitened_in_waves
 from host.vehicle import default_vehicle
-from host.waves import SHAPE, in_waves, in_waves_from, is_sea, passes_in_waves, whitened_in_waves
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 
@@ -192,7 +192,7 @@ def test_one_wave_in_depth_and_pitch_leaves_speed_and_damping_alone(monkeypatch:
     assert fit.parameters[5] == pytest.approx(u0, rel=0.05)
     # Two waves that know nothing of one another, as likely as can be, are less likely than the one.
     unknown = [replace(each, lower=0.0, upper=0.0) if each.name == "wave_turn" else each for each in SHAPE]
-    monkeypatch.setattr("host.waves.SHAPE", tuple(unknown))
+    monkeypatch.setattr("host.likelihood.waves.SHAPE", tuple(unknown))
     turning = fit.levels[5] * (frequency * turn) ** 2
     apart = Point(fit.structure, fit.parameters, fit.initial, np.array([*fit.levels[:6], turning]))
     two = in_waves_from(apart, [inputs_of(recording)], fit.free)

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from host.equations import NAMES
-from host.identify import identify
-from host.model import VehicleModel
-from host.outliers import outliers, without_outliers
-from host.predict import predict
-from host.recording import Array, Recording, notes_of
+from host.dynamics.equations import NAMES
+from host.identification.identify import identify
+from host.identification.model import VehicleModel
+from host.identification.predict import predict
+from host.recordings.outliers import outliers, without_outliers
+from host.recordings.recording import Array, Recording, notes_of
 from host.vehicle import default_vehicle
 
 LEVELS = {"pitch": float(np.deg2rad(20.0)), "depth": 3.0}

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib import pyplot as plt
 
-from host.plots import line_through
+from host.identification.plots import line_through
 
 
 def test_readings_with_empty_rows_between_are_joined() -> None:

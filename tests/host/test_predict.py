@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from exact_dive import TABLE_1, Dive, fly
 
-from host.equations import NAMES
+from host.dynamics.equations import NAMES
 from host.errors import RecordingError
-from host.model import VehicleModel
-from host.predict import predict, score
-from host.simulate import simulate
+from host.identification.model import VehicleModel
+from host.identification.predict import predict, score
+from host.identification.simulate import simulate
 
 
 def true_model() -> VehicleModel:

@@ -3,9 +3,9 @@ import pytest
 from exact_dive import TABLE_1, Dive, fly
 from scipy.stats import multivariate_normal
 
-from host.kalman import kalman_pass
-from host.propagate import free_run, inputs_of, longest_substep
-from host.sensitivities import innovations
+from host.dynamics.propagate import free_run, inputs_of, longest_substep
+from host.dynamics.sensitivities import innovations
+from host.likelihood.kalman import kalman_pass
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 

@@ -6,8 +6,8 @@ import pytest
 
 from bridge.measurement import Measurement, Quantity
 from host.errors import RecordingError
-from host.journal import Journal
-from host.read_recordings import read_recordings
+from host.live.journal import Journal
+from host.recordings.read import read_recordings
 from host.vehicle import default_vehicle
 
 

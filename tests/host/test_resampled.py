@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from host.csv_map import CsvMap
-from host.csv_recording import read_csv_recording
-from host.resampled import between, repeats
+from host.recordings.csv_map import CsvMap
+from host.recordings.csv_recording import read_csv_recording
+from host.recordings.resampled import between, repeats
 
 
 def dive(rows: int = 2000, noise: float = 0.008) -> np.ndarray:

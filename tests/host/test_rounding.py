@@ -6,9 +6,9 @@ from exact_dive import Dive, fly
 from hypothesis import given
 from hypothesis import strategies as st
 
-from host.maximum_likelihood import fit_maximum_likelihood
-from host.noise_floor import noise_floor, resolution
-from host.rounding import lattice, quantum, thinned
+from host.likelihood.maximum_likelihood import fit_maximum_likelihood
+from host.noise.noise_floor import noise_floor, resolution
+from host.recordings.rounding import lattice, quantum, thinned
 
 
 def quantised(step_m: float, duration: float = 60.0):  # type: ignore[no-untyped-def]

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from host.errors import HostError
-from host.state import fingerprint, load_state, save_state
+from host.live.state import fingerprint, load_state, save_state
 
 BODY = {"theta": [0.1, -2.5e-17, 3.0], "rows": 7, "pitch": {"P": [[1.0, 0.0]]}}
 
@@ -85,7 +85,7 @@ def test_a_failed_save_leaves_the_old_state(tmp_path: Path, monkeypatch: pytest.
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("host.state.os.fsync", full)
+    monkeypatch.setattr("host.live.state.os.fsync", full)
     with pytest.raises(HostError, match="No space left"):
         save_state(path, {"theta": [0.0]}, vehicle="lauv", configuration="abc")
     assert load(path).body == BODY

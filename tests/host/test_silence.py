@@ -1,7 +1,7 @@
 """Silences are said once each, and their end too."""
 
 from bridge.measurement import Quantity
-from host.silence import SilenceWatch
+from host.live.silence import SilenceWatch
 
 
 def test_a_silence_and_its_end_are_said_once() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from host.speed import smoothed_speed
+from host.noise.speed import smoothed_speed
 
 
 def test_a_constant_speed_gives_its_mean() -> None:

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from host.drift import Whitening
-from host.equations import NAMES
-from host.maximum_likelihood import fit_maximum_likelihood
-from host.propagate import free_run, inputs_of
-from host.recording import Array, Recording
-from host.speed import smoothed_speed
-from host.speed_error import speed_error, speed_errors
+from host.dynamics.equations import NAMES
+from host.dynamics.propagate import free_run, inputs_of
+from host.likelihood.maximum_likelihood import fit_maximum_likelihood
+from host.noise.drift import Whitening
+from host.noise.speed import smoothed_speed
+from host.noise.speed_error import speed_error, speed_errors
+from host.recordings.recording import Array, Recording
 
 BASE = np.array([-0.63084, -3.38699, -8.19858, 0.41385, -3.94120, 1.5, 0.0, 0.0])
 DEPTH_NOISE, PITCH_NOISE, SPEED_NOISE = 0.005, 0.001, 0.05

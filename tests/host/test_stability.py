@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from host.stability import is_stable
+from host.identification.stability import is_stable
 
 HULL = {"a1": -1.0, "a2": -2.0, "a3": -0.5}
 

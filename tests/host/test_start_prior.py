@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from host.propagate import begun_at
-from host.recording import Array
-from host.start_prior import EXCESS, PRICE, SCALE, start_cost, start_normal
+from host.dynamics.propagate import begun_at
+from host.likelihood.start_prior import EXCESS, PRICE, SCALE, start_cost, start_normal
+from host.recordings.recording import Array
 
 EXCESSES = st.floats(-1.0, 1.0)
 

@@ -5,9 +5,9 @@ import pytest
 from exact_dive import TABLE_1, Dive, fly
 from scipy.signal import lfilter
 
-from host.maximum_likelihood import fit_maximum_likelihood
-from host.uncertainty import covariance
-from host.whiteness import autocovariance, clustering, crosscovariance, is_even, is_white
+from host.identification.uncertainty import covariance
+from host.likelihood.maximum_likelihood import fit_maximum_likelihood
+from host.noise.whiteness import autocovariance, clustering, crosscovariance, is_even, is_white
 
 
 def test_white_noise_is_white_and_filtered_noise_is_not() -> None:

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from exact_dive import Dive, fly
 
-from host.equations import BASE, NAMES
-from host.fit import Fit
-from host.gauss_newton import Point
-from host.maximum_likelihood import fit_maximum_likelihood
-from host.output_error import output_error
-from host.propagate import Inputs, inputs_of
-from host.uncertainty import covariance
-from host.valleys import A1, USUAL_DAMPING, USUAL_SPEED, other_valleys, plausibility, with_rivals
+from host.dynamics.equations import BASE, NAMES
+from host.dynamics.propagate import Inputs, inputs_of
+from host.identification.uncertainty import covariance
+from host.likelihood.fit import Fit
+from host.likelihood.gauss_newton import Point
+from host.likelihood.maximum_likelihood import fit_maximum_likelihood
+from host.likelihood.output_error import output_error
+from host.likelihood.valleys import A1, USUAL_DAMPING, USUAL_SPEED, other_valleys, plausibility, with_rivals
 
 U0 = NAMES.index("u0")
 

@@ -6,12 +6,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from host.identify import identify
-from host.plots import overview_plot
-from host.predict import Prediction, score
-from host.report import unit_of
+from host.identification.identify import identify
+from host.identification.plots import overview_plot
+from host.identification.predict import Prediction, score
+from host.identification.report import unit_of
+from host.identification.verdict import free_runs, verdict
 from host.vehicle import default_vehicle
-from host.verdict import free_runs, verdict
 from tools.accuracy.dive import Case, fly
 from tools.accuracy.methods import recording_of
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from host import machine_code
+from host.compiled import machine_code
 from tools import bench_compiler
 from tools.bench_compiler import main
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from host.errors import RecordingError
-from host.recording import Recording
+from host.recordings.recording import Recording
 from tools.cli import main
 
 DATA = Path(__file__).parent.parent / "data"

@@ -26,7 +26,7 @@ from bridge.mavlink_decoder import MavlinkDecoder
 from bridge.mavlink_map import MavlinkMap, ServoTerm
 from bridge.measurement import Quantity
 from host.errors import ConfigError, RecordingError
-from host.journal import Journal
+from host.live.journal import Journal
 from host.vehicle import default_vehicle, effective_table
 from tools.commands import replay
 from tools.log_frames import frames_of

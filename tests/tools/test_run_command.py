@@ -19,8 +19,8 @@ from bridge.measurement import Quantity
 from firmware_model.config import EstimatorConfig
 from firmware_model.vertical_plane import VerticalPlaneEstimator
 from host.errors import ConfigError, HostError
-from host.journal import read_journal
-from host.live import Progress
+from host.live.journal import read_journal
+from host.live.loop import Progress
 from tools.commands import run as command
 
 ROOT = Path(__file__).parents[2]

@@ -12,8 +12,8 @@ from time import process_time
 import numpy as np
 from scipy.signal import lfilter
 
-from host.maximum_likelihood import fit_maximum_likelihood
-from host.uncertainty import covariance
+from host.identification.uncertainty import covariance
+from host.likelihood.maximum_likelihood import fit_maximum_likelihood
 from tools.accuracy.bound import joint_bound
 from tools.accuracy.dive import NAMES, Array, Case, Dive, fly, simulate, transition
 from tools.accuracy.methods import recording_of

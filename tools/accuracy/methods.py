@@ -10,10 +10,10 @@ from firmware_model.config import EstimatorConfig, MilsConfig, RobustConfig
 from firmware_model.estimator import make_estimator
 from firmware_model.sample import Sample
 from host.errors import RecordingError
-from host.identify_car import car_least_squares
-from host.maximum_likelihood import fit_maximum_likelihood
-from host.recording import Recording
-from host.uncertainty import covariance
+from host.identification.identify_car import car_least_squares
+from host.identification.uncertainty import covariance
+from host.likelihood.maximum_likelihood import fit_maximum_likelihood
+from host.recordings.recording import Recording
 from host.vehicle import vehicle_from_table
 from tools.accuracy.dive import NAMES, Array, Case, Dive
 

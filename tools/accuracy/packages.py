@@ -6,9 +6,9 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from host.equations import NAMES as PARAMETER_NAMES
-from host.model import VehicleModel
-from host.recording import Recording
+from host.dynamics.equations import NAMES as PARAMETER_NAMES
+from host.identification.model import VehicleModel
+from host.recordings.recording import Recording
 from tools.accuracy.dive import Array, Case, fly
 from tools.accuracy.methods import COMPARED, METHODS, recording_of
 from tools.compare.free_run import FreeRun

@@ -6,7 +6,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from host.recording import Recording
+from host.recordings.recording import Recording
 from tools.bench import add_leave_out, load_vehicle, progress, read_all, require_bench, tell_notes
 
 
@@ -64,9 +64,9 @@ def run(args: argparse.Namespace) -> int:
     jobs = args.jobs if args.jobs is not None else min(8, len(os.sched_getaffinity(0)))
     vehicle = load_vehicle(args.vehicle)
     require_bench()
-    from host.afloat import under_water
-    from host.left_out import spans_in, without
-    from host.model import read_model
+    from host.identification.model import read_model
+    from host.recordings.afloat import under_water
+    from host.recordings.left_out import spans_in, without
 
     leave_out = spans_in(args.leave_out)
     model = read_model(args.model) if args.model is not None else None
@@ -74,14 +74,14 @@ def run(args: argparse.Namespace) -> int:
         dives = without(under_water(read_all(args.recordings, vehicle, say)), leave_out)
         recordings = _part(dives, args)
         from host.catalogue import named
+        from host.diagnosis.against.given_model import against_model
+        from host.diagnosis.against.given_simulation import against_simulation, check_same_flight
         from host.diagnosis.answer import Answer
-        from host.diagnosis.deviations import interval
         from host.diagnosis.diagnose import diagnose
-        from host.diagnosis.files import write_diagnosis, write_extended_model
-        from host.diagnosis.given_model import against_model
-        from host.diagnosis.given_simulation import against_simulation, check_same_flight
-        from host.diagnosis.report import summary, title, write_report
+        from host.diagnosis.proof.deviations import interval
         from host.diagnosis.separation import separations
+        from host.diagnosis.told.files import write_diagnosis, write_extended_model
+        from host.diagnosis.told.report import summary, title, write_report
 
         simulated: list[Recording] = []
         if args.simulation is not None:
@@ -123,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _part(recordings: list[Recording], args: argparse.Namespace) -> list[Recording]:
     """What of the recordings is looked at: all of it, or the part around a change."""
-    from host.diagnosis.around import around, around_alarm
+    from host.diagnosis.recordings.around import around, around_alarm
 
     if args.around is not None:
         return around(recordings, args.around)

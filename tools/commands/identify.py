@@ -37,12 +37,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     require_bench()
-    from host.afloat import under_water
-    from host.identify import identify
-    from host.left_out import spans_in, without
-    from host.model import write_model
-    from host.report import advice, unit_of, write_report
-    from host.verdict import verdict
+    from host.identification.identify import identify
+    from host.identification.model import write_model
+    from host.identification.report import advice, unit_of, write_report
+    from host.identification.verdict import verdict
+    from host.recordings.afloat import under_water
+    from host.recordings.left_out import spans_in, without
 
     vehicle, leave_out = load_vehicle(args.vehicle), spans_in(args.leave_out)
     worst = 0

@@ -18,9 +18,9 @@ def run(args: argparse.Namespace) -> int:
     require_bench()
     import numpy as np
 
-    from host.afloat import under_water
-    from host.model import read_model
-    from host.predict import predict, score
+    from host.identification.model import read_model
+    from host.identification.predict import predict, score
+    from host.recordings.afloat import under_water
 
     model = read_model(args.model)
     recordings = under_water(read_all([args.recording], load_vehicle(args.vehicle), lambda _: None))

@@ -16,8 +16,8 @@ from bridge.measurement import Quantity
 from bridge.source import Source
 from firmware_model.estimate import Estimate
 from host.errors import ConfigError
-from host.journal import Journal
-from host.live import LiveLoop, Progress
+from host.live.journal import Journal
+from host.live.loop import LiveLoop, Progress
 from host.vehicle import Vehicle, effective_table, read_vehicle
 
 UNITS = {"a1": "1/s", "a2": "1/s", "a3": "1/s^2", "b1": "m/s^2", "b2": "1/s^2", "u0": "m/s", "c_wq": "m/s"}

@@ -17,8 +17,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     require_bench()
-    from host.model import read_model
-    from host.simulate import simulate, write_simulation
+    from host.identification.model import read_model
+    from host.identification.simulate import simulate, write_simulation
 
     model = read_model(args.model)
     vehicle = load_vehicle(args.vehicle)

@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     require_bench()
-    from host.afloat import under_water
+    from host.recordings.afloat import under_water
     from tools.compare.held_out import compare, median_of, table_of
     from tools.compare.methods import EXTENDED, LINEAR, extended_model, installed, linear_model, missing
 

@@ -7,13 +7,13 @@ from typing import Protocol
 import numpy as np
 from scipy.optimize import least_squares
 
-from host.recording import Array, Recording
+from host.recordings.recording import Array, Recording
 from tools.compare.series import Series, series_of
 
 FreeRun = Callable[[Recording], Array]
 """Pitch and depth (2, N) at the recording's rows; of what was measured it sees the first 5 s."""
 
-UNITS = np.array([[0.00175], [0.01]])  # 0.1 deg, 1 cm: weights of the start, as in host.predict
+UNITS = np.array([[0.00175], [0.01]])  # 0.1 deg, 1 cm: weights of a start, as in host.identification.predict
 CHOSEN_ON = 0.7  # share of the series that a candidate learns from; the rest chooses among them
 RUNAWAY = 1e6  # in UNITS
 

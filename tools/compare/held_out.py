@@ -7,9 +7,9 @@ from time import perf_counter
 import numpy as np
 
 from host.errors import RecordingError
-from host.noise_floor import noise_floor
-from host.predict import SETTLING_SPAN
-from host.recording import Array, Recording
+from host.identification.predict import SETTLING_SPAN
+from host.noise.noise_floor import noise_floor
+from host.recordings.recording import Array, Recording
 from tools.compare.free_run import FreeRun
 from tools.compare.methods import EXTENDED, LINEAR, Teach, extended_model, installed, linear_model
 

@@ -10,9 +10,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from host.model import VehicleModel, read_model
-from host.predict import predict
-from host.recording import Array, Recording
+from host.identification.model import VehicleModel, read_model
+from host.identification.predict import predict
+from host.recordings.recording import Array, Recording
 from host.vehicle import default_vehicle
 from tools.compare.free_run import FreeRun, best_of
 
@@ -60,7 +60,7 @@ def missing() -> str:
 
 def linear_model(teaching: list[Recording]) -> FreeRun:
     """The base equations by maximum likelihood, as `mils identify` learns them."""
-    from host.identify import identify
+    from host.identification.identify import identify
 
     return run_of(identify(teaching, default_vehicle()).model)
 
@@ -68,7 +68,7 @@ def linear_model(teaching: list[Recording]) -> FreeRun:
 def extended_model(teaching: list[Recording]) -> FreeRun:
     """The extended model that `mils diagnose` hands back."""
     from host.diagnosis.diagnose import diagnose
-    from host.diagnosis.files import write_extended_model
+    from host.diagnosis.told.files import write_extended_model
 
     with TemporaryDirectory() as folder:
         path = Path(folder) / "extended_model.json"

@@ -9,7 +9,7 @@ from sysidentpy.basis_function import Polynomial
 from sysidentpy.model_structure_selection import FROLS
 from sysidentpy.parameter_estimation import LeastSquares
 
-from host.recording import Array
+from host.recordings.recording import Array
 from tools.compare.free_run import Learner
 from tools.compare.series import Series
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.predict import SETTLING_SPAN
-from host.recording import Array, Recording
+from host.identification.predict import SETTLING_SPAN
+from host.recordings.recording import Array, Recording
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,7 +9,7 @@ import numpy as np
 import pysindy
 from scipy.signal import savgol_filter
 
-from host.recording import Array
+from host.recordings.recording import Array
 from tools.compare.free_run import Learner
 from tools.compare.series import Series
 

@@ -12,7 +12,7 @@ from io import StringIO
 
 import numpy as np
 
-from host.recording import Array
+from host.recordings.recording import Array
 from tools.compare.free_run import UNITS, Learner
 from tools.compare.series import Series
 

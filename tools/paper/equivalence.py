@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from host.recording import Array
+from host.recordings.recording import Array
 from tools.paper.printed import correct_truth, relative_error
 from tools.paper.regression import P0, Rows, multiplicity, respond, rows_of, square_root, weighted_fit
 from tools.paper.rudder import H, multistep

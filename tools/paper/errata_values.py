@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 from scipy.signal import ss2tf
 
-from host.recording import Array
+from host.recordings.recording import Array
 from tools.paper.erratum import Erratum
 from tools.paper.printed import (
     correct_truth,

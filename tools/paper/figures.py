@@ -5,8 +5,8 @@ from matplotlib import pyplot as plt
 from matplotlib.lines import Line2D
 
 from firmware_model import car_from_physical
-from host.plots import MEASURED, MODEL, RUDDER, data_uri
-from host.recording import Array
+from host.identification.plots import MEASURED, MODEL, RUDDER, data_uri
+from host.recordings.recording import Array
 from tools.paper.equivalence import Equality
 from tools.paper.lake import DEGREES, LENGTH, Lake
 from tools.paper.lake_data import CHANNELS

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from host.recording import Array
+from host.recordings.recording import Array
 from tools.paper.lake_data import (
     CHANNELS,
     STEP,

@@ -13,7 +13,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import median_filter
 from scipy.signal import butter, filtfilt, savgol_filter
 
-from host.recording import Array
+from host.recordings.recording import Array
 from tools.paper.printed import printed
 from tools.sitl.effects import Effects
 from tools.sitl.excitation import Excitation

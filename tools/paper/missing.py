@@ -8,11 +8,11 @@ from math import radians
 
 import numpy as np
 
-from host.equations import NAMES
+from host.dynamics.equations import NAMES
 from host.errors import RecordingError
-from host.model import VehicleModel
-from host.predict import predict
-from host.recording import Array, Recording
+from host.identification.model import VehicleModel
+from host.identification.predict import predict
+from host.recordings.recording import Array, Recording
 from tools.paper.missing_methods import METHODS, Method
 from tools.paper.printed import correct_truth, printed, relative_error
 from tools.paper.regression import respond

@@ -1,7 +1,7 @@
 """The methods that the missing-data study compares; a further one is one more line in METHODS.
 
 Each takes a recording with NaN where nothing was measured and gives the parameters (8,) in the order of
-host.equations.NAMES. Raises ValueError or LinAlgError where the data do not suffice.
+host.dynamics.equations.NAMES. Raises ValueError or LinAlgError where the data do not suffice.
 """
 
 from collections.abc import Callable
@@ -13,9 +13,9 @@ from firmware_model import Mils, physical_from_car
 from firmware_model.config import EstimatorConfig
 from firmware_model.estimator import make_estimator
 from firmware_model.sample import Sample
-from host.equations import NAMES
-from host.maximum_likelihood import fit_maximum_likelihood
-from host.recording import Array, Recording
+from host.dynamics.equations import NAMES
+from host.likelihood.maximum_likelihood import fit_maximum_likelihood
+from host.recordings.recording import Array, Recording
 from tools.paper.printed import PHYSICAL, printed
 from tools.paper.regression import Rows, rows_of
 

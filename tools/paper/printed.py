@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from firmware_model import car_from_physical
-from host.recording import Array
+from host.recordings.recording import Array
 
 PHYSICAL = ("a1", "a2", "a3", "b1", "b2")
 

@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 
 from firmware_model import Mils
 from firmware_model.car import DEPTH_LAGS, PITCH_LAGS
-from host.recording import Array
+from host.recordings.recording import Array
 
 Mask = NDArray[np.bool_]
 LAGS = {"alpha": PITCH_LAGS, "beta": DEPTH_LAGS}

@@ -7,7 +7,7 @@ from math import radians
 import numpy as np
 
 from firmware_model import physical_from_car
-from host.recording import Array
+from host.recordings.recording import Array
 from tools.paper.printed import (
     PHYSICAL,
     Estimates,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from host.recording import Array
+from host.recordings.recording import Array
 
 H = 0.1  # s, the paper's step
 FREQUENCY = 0.01  # Hz, caption of the paper's Figure 1

@@ -10,7 +10,7 @@ from math import pi
 
 import numpy as np
 
-from host.recording import Array
+from host.recordings.recording import Array
 from tools.paper.printed import Estimates, correct_truth, printed_estimates
 from tools.paper.regression import respond, rows_of, weighted_fit
 from tools.paper.rudder import H, sine

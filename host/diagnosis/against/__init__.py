@@ -1,0 +1,1 @@
+"""A model or a simulation that the user holds, set against the recording."""

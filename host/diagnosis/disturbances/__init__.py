@@ -1,0 +1,1 @@
+"""Searches among waves, under random forces, and beside what drifts."""

@@ -1,0 +1,67 @@
+"""Searches that begin with all that every vehicle has, among waves or forces that were told beside it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from host.diagnosis.disturbances.seas import (
+    Explained,
+    Waves,
+    beside_own_waves,
+    search_among,
+    searched_among,
+    told_waves,
+)
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.leftover import leftover
+from host.diagnosis.fits.margins import margin
+from host.diagnosis.fits.prospects import form_gains
+from host.diagnosis.fits.sea_fits import again_in_waves, with_sea
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.search.search import Search
+from host.diagnosis.search.whole_vehicle import is_real
+
+
+def in_a_swell(calm: Search, swell: Explanation) -> Explained | None:
+    """The search from all that every vehicle has among waves estimated beside it; None if few of it pay.
+
+    Or if something is left: as no search without waves was made, nothing speaks for them then.
+    """
+    fitter = calm.fitter
+    search = search_among(calm, swell)
+    found = search.run_from(swell)
+    if not is_real(found.names):
+        return None
+    found, fitted = beside_own_waves(search, swell, found)
+    left = leftover(fitter, fitted)
+    told = told_waves(fitter, fitted, with_sea(fitter, fitted).bic - fitted.bic)
+    return Explained(found, search, left, told, is_of_all=True) if left.is_nothing else None
+
+
+def again_in_a_swell(
+    fitter: Fitter, workers: Workers, on_progress: Callable[[str], None], part: Explained, waves: Waves
+) -> Explained:
+    """What was found so on a part of the recordings, on the whole of them in the same waves."""
+    calm = Search(fitter, workers, on_progress, fitter.base, fitter.root, part.search)
+    first = again_in_waves(fitter, waves.fitted)
+    search, found, told = searched_among(calm, first, with_sea(fitter, first).bic)
+    return Explained(found, search, leftover(fitter, told.fitted), told)
+
+
+def pushed_about(calm: Search, pushed: Explanation, are_far_likelier: bool) -> Explained | None:
+    """What pays of all that every vehicle has under random forces; None if little does, or nothing is left.
+
+    Of forces that leave nothing it must be asked whether they are any, unless they are far likelier than
+    none; where a form of unknown physics gains beside these, they stand for physics in part.
+    """
+    fitter = calm.fitter
+    calm.on_progress("random forces")
+    base, root = with_sea(fitter, calm.base), with_sea(fitter, calm.root)
+    search = Search(fitter, calm.workers, calm.on_progress, base, root)
+    found = search.run_from(pushed, is_all=True)
+    left = leftover(fitter, found)
+    if not is_real(found.names) or (left.is_nothing and not are_far_likelier):
+        return None
+    if left.is_nothing and max(form_gains(fitter, found).values()) > margin(found):
+        left = replace(left, is_smooth=True)
+    return Explained(found, search, left, None, is_of_all=True)

@@ -1,0 +1,1 @@
+"""What of the recordings teaches, what only judges, and what says nothing."""

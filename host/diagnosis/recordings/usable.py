@@ -1,0 +1,37 @@
+"""Whether recordings can teach anything."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from host.diagnosis.recordings.spans import LEAST_MEASURED
+from host.errors import RecordingError
+from host.recordings.recording import Recording
+
+SHORTEST = 10.0  # s
+
+
+def check_usable(recordings: list[Recording]) -> None:
+    """Raises RecordingError with one line where they are too short, or a sensor is still or hardly read."""
+    name, longest = recordings[0].name, max(recording.duration for recording in recordings)
+    if longest < SHORTEST:
+        raise RecordingError(f"{name}: {longest:.3g} s are too short; at least {SHORTEST:.0f} s are needed")
+    for channel in ("pitch", "depth"):
+        values = [getattr(recording, channel) for recording in recordings]
+        count = sum(int(np.isfinite(one).sum()) for one in values)
+        if count < LEAST_MEASURED:
+            raise RecordingError(
+                f"{name}: {channel} has {count} readings; at least {LEAST_MEASURED} are needed"
+            )
+        if all(np.nanmax(one) == np.nanmin(one) for one in values if np.isfinite(one).any()):
+            raise RecordingError(f"{name}: {channel} never changes: there is no motion to explain")
+
+
+def with_plane_told(recordings: list[Recording]) -> list[Recording]:
+    """With a note where the plane never moves: what was read may be something else."""
+    if any(np.ptp(recording.rudder) > 0.0 for recording in recordings):
+        return recordings
+    note = (
+        "the plane never moves: nothing is learnt of what it does (is its column or message the right one?)"
+    )
+    return [replace(recording, notes=(*recording.notes, note)) for recording in recordings]

@@ -1,0 +1,205 @@
+"""All that every vehicle has, fitted before any effect is tried alone.
+
+The base equations bend so far to what a real vehicle has beside them that of its effects none alone says
+much, and the search that begins with each takes longest. All at once take no longer than two of them: where
+they leave nothing, it only has to be found which of them pay; where next to nothing, what acts beside them.
+What they hardly touch is no hull's: then something may have changed under way, go with time or keep the plane
+back.
+"""
+
+from collections.abc import Iterable, Iterator
+from math import inf, log
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from host.catalogue import ALONG_THE_HULL, FAINT, ORDINARY
+from host.catalogue.kin import OFFSETS
+from host.catalogue.moments import SCANS
+from host.catalogue.nuisance import FREE_TRIM
+from host.catalogue.unknown import WANDERING
+from host.diagnosis.fits.explanation import Explanation, Names
+from host.diagnosis.fits.fitter import ROUGHLY, Fitter
+from host.diagnosis.fits.margins import LITTLE, MUCH, margin
+from host.diagnosis.fits.prospects import form_gains
+from host.diagnosis.fits.sea_fits import as_filtered, with_sea
+from host.diagnosis.fits.speed_forces import are_by_speed
+from host.diagnosis.fits.starts import begun_from, guess
+from host.diagnosis.fits.trims import retrimmed
+from host.diagnosis.fits.workers import Workers
+from host.diagnosis.search.lone_form import likely_forms
+from host.diagnosis.search.pruning import pruned
+from host.diagnosis.search.together import with_more
+from host.diagnosis.search.whole_vehicle import all_beside, ended, is_real
+from host.likelihood.gauss_newton import Point
+
+if TYPE_CHECKING:
+    from host.diagnosis.search.search import Search
+
+FAR_LESS = 0.2  # of what the root leaves
+HALF = 0.5  # of what is left: a fault of the drive is no small part of it where it leads
+LOST = 20.0  # times the noise floor: no hull leaves so much by what it is, but by what happens to it
+MOST_FORCES = 0.1  # of the variance of all force: what acts is known but for a tenth
+FAR_LIKELIER = 0.1  # of BIC a sample, under random forces
+FAIR_PART = 0.02  # of what these explain, that what is missing should gain even beside them
+TURNING = ("munk_moment", "heave_pitch_rate_coupling")
+LEADING = 3  # of what may lead, beside which all the rest is tried
+DRIVE = (
+    "actuator_backlash",
+    "actuator_rate_limit",
+    "actuator_saturation",
+    "actuator_delay",
+    "rudder_stall",
+)
+"""What may keep a plane from where it is commanded to: then no hull follows the commands."""
+IN_TIME = ("surface_waves", "internal_wave", "unknown_swinging_moment", *sorted(WANDERING))
+"""What swings with one period, or wanders. Of a sea it follows a part: little must be left beside it."""
+
+
+def at_the_outset(fitter: Fitter, jobs: int = 1) -> Explanation | None:
+    """The root with all that every vehicle has, where that leaves much; None where it does not.
+
+    Where they lead nowhere, beside what changes at one moment, goes with time or keeps the plane back, if
+    that leaves less; where they leave much, beside the latter two.
+    """
+    if fitter.excess(fitter.root.fit) < MUCH:
+        return None
+    best = fitter.root
+    names = frozenset({FREE_TRIM.name, *ORDINARY, *FAINT, ALONG_THE_HULL})
+    names |= {*fitter.tools_beside(names)}
+    for start in _starts(fitter, names):
+        found = ended(fitter, start, names)
+        if says_all(fitter, found):
+            return found
+        best = min(best, found, key=lambda e: e.bic)
+        if fitter.excess(best.fit) > LOST:
+            led = _beside_what_leads(fitter, best, (*SCANS, *DRIVE, *IN_TIME), jobs)
+            return min([best, *led], key=lambda e: e.bic)
+    best = min(best, _by_fewer(fitter, fitter.root, best, jobs), key=lambda e: e.bic)
+    if fitter.excess(best.fit) > MUCH:
+        led = _beside_what_leads(fitter, best, (*DRIVE, *IN_TIME), jobs)
+        best = min([best, *led], key=lambda e: e.bic)
+    return best
+
+
+def _by_fewer(fitter: Fitter, leading: Explanation, whole: Explanation, jobs: int) -> Explanation:
+    """The same from where all but the faint ends, which leads some fits elsewhere, with the likeliest offset.
+
+    That of the plane grows with the square of the speed, and a free trim, which does its work, does not.
+
+    leading  the root, or with what leads: where all of it begins
+    """
+    few = whole.names - {*FAINT, ALONG_THE_HULL}
+    lean = ended(fitter, begun_from(fitter, leading, few), few)
+    with Workers(fitter, jobs) as workers:
+        others = workers.results([(retrimmed, (lean, frozenset({name}))) for name in OFFSETS])
+    best: Explanation = min([lean, *others], key=lambda e: e.bic)
+    names = best.names | whole.names - {FREE_TRIM.name}
+    all_of_it = ended(fitter, begun_from(fitter, best, names), names)
+    return all_of_it if all_of_it.fit.log_likelihood > best.fit.log_likelihood - ROUGHLY else best
+
+
+def says_all(fitter: Fitter, whole: Explanation) -> bool:
+    """Whether it leaves white noise, as sensors have it."""
+    return whole.leaves_white and fitter.excess(whole.fit) < MUCH
+
+
+def leads_on(fitter: Fitter, whole: Explanation) -> bool:
+    """Whether all that every vehicle has leaves far less than the root, or beside a change not much."""
+    most = MUCH if whole.names & {*SCANS} else FAR_LESS * fitter.excess(fitter.root.fit)
+    return fitter.excess(whole.fit) < most
+
+
+def _beside_what_leads(
+    fitter: Fitter, whole: Explanation, names: Iterable[str], jobs: int
+) -> list[Explanation]:
+    """The likeliest of these, each with all that every vehicle has and alone, where the rest does not pay.
+
+    The likeliest of all once more from where all but the faint ends, if something is left. Where one alone
+    leaves nothing, it alone.
+
+    whole  all that every vehicle has without these
+    """
+    with Workers(fitter, jobs) as workers:
+        alone = workers.results([(Fitter.grown, (fitter.root, name, [])) for name in names])
+        fitter.at_first |= {one.names: one.lean() for one in alone}
+        leading: list[Explanation] = sorted(alone, key=lambda e: e.bic)[:LEADING]
+        if leading[0].leaves_white and fitter.excess(leading[0].fit) < LITTLE:
+            return leading[:1]
+        beside: list[Explanation] = workers.results([(all_beside, (one,)) for one in leading])
+    best, begun = min(zip(beside, leading, strict=True), key=lambda pair: pair[0].bic)
+    found = [*leading, *beside]
+    if fitter.excess(best.fit) > LITTLE:
+        found.append(_by_fewer(fitter, begun, best, jobs))
+    return [e for e in found if _is_no_chance(fitter, e, whole)]
+
+
+def _is_no_chance(fitter: Fitter, led: Explanation, whole: Explanation) -> bool:
+    """Whether what leads does more than follow a part of a sea, as many may a little."""
+    left = fitter.excess(led.fit)
+    if left < LITTLE or led.names & {*SCANS}:
+        return True
+    return led.names.isdisjoint(IN_TIME) and left < HALF * fitter.excess(whole.fit)
+
+
+def pushed_by_forces(search: "Search", whole: Explanation) -> Explanation | None:
+    """The same under random forces, where these explain the rest and nothing gains beside them; else None.
+
+    Then the vehicle is as the equations have it but for what pushes it about and is in no catalogue, as turns
+    do; of something in the catalogue those forces would be the worse half. What is left beside a change or a
+    fault of the plane's drive may be another of these.
+    """
+    fitter = search.fitter
+    if not LITTLE < fitter.excess(whole.fit) < LOST or whole.names & {*SCANS, *DRIVE, *IN_TIME}:
+        return None
+    sea = with_sea(fitter, whole)
+    explained = as_filtered(fitter, whole).bic - sea.bic
+    are_many = (sea.fit.noise[2:] > MOST_FORCES * np.square(fitter.accelerations)).any()
+    if are_many or explained < FAR_LIKELIER * sea.fit.samples or are_by_speed(fitter, sea.fit):
+        return None
+    least = max(margin(sea) + log(sea.fit.samples), FAIR_PART * explained)
+    return sea if max(search.gains(sea).values()) < least else None
+
+
+def goes_on_from(search: "Search", joint: Explanation) -> bool:
+    """Whether many of a set of many pay, or of what else promises to beside them: then no search need begin.
+
+    Or beside a form of unknown physics, where what promises most leaves something and that form white noise.
+    What pays is remembered. Of few, each alone tells more; and where something is left, a leading effect may.
+    """
+    search.on_progress("what every vehicle has")
+    search.joint.add(joint.names)
+    more = with_more(search, search.remember(joint), least=0.0)
+    if not (more.leaves_white or search.fitter.excess(more.fit) < LITTLE):
+        more = min(more, _with_a_form(search, joint), key=lambda e: e.bic)
+    is_all = more.leaves_white or search.fitter.excess(more.fit) < LITTLE
+    if is_all and is_real(pruned(search, more).names):
+        return True
+    search.joint.clear()  # beside what the search finds they are tried again
+    return False
+
+
+def _with_a_form(search: "Search", whole: Explanation) -> Explanation:
+    """The same with the likeliest form of unknown physics, where that leaves white noise; else itself.
+
+    What promised most of the catalogue may have been taken for it, so it is asked for without that.
+    """
+    likely = likely_forms(form_gains(search.fitter, whole), margin(whole))
+    grown: list[Explanation] = search.workers.results([search.growth(whole, name) for name in likely])
+    polished = search.polished_near(grown, min((e.bic for e in grown), default=inf))
+    best = min((e for e in polished if e.leaves_white), key=lambda e: e.bic, default=whole)
+    search.joint.add(best.names)
+    return best
+
+
+def _starts(fitter: Fitter, names: Names) -> Iterator[Point]:
+    """Beside the root and a hull that turns, where what joins hardly acts, and by what a regression says.
+
+    Without a servo's lag, which alone takes a pole of the hull and leads elsewhere.
+    """
+    hull = fitter.root
+    yield (root := begun_from(fitter, hull, names))
+    for name in TURNING:
+        hull = fitter.grown(hull, name, [])
+    yield begun_from(fitter, hull, names)
+    yield guess(fitter, root, names)

@@ -1,0 +1,1 @@
+"""What is told of a diagnosis: its files, its page, its pictures."""

@@ -1,0 +1,1 @@
+"""The vehicle's equations, their propagation over a recording, and its sensitivities."""

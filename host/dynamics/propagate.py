@@ -1,0 +1,266 @@
+"""Propagation of the equations over a recording.
+
+Between rows the command is held (zero-order hold), as the actuator holds it, and the state advances by
+classical fourth-order Runge-Kutta in sub-steps short enough that its error stays below the sensors'
+resolution.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+
+from host.compiled.over_rows import KEPT, over_rows
+from host.dynamics.equations import BASE, START, Chain, Structure
+from host.noise.drift import NOT_WHITENED, Whitenings
+from host.noise.speed import smoothed_speed
+from host.recordings.recording import Array, Recording
+
+NX0 = len(START)
+MOST_SUBSTEPS = 8  # slow records show no modes faster than their sampling: finer steps would resolve nothing
+LONGEST_SUBSTEP = 0.05  # s; for a 10 rad/s mode the error of one sub-step is below 3e-4 of its change
+LONGEST_OF_ALL = 0.5  # s; a quarter of the shortest period of a wave
+LONGEST_DELAY = 1.0  # s; how far back commands are looked up
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inputs:
+    """What drives the equations over one recording, and what was measured. N rows.
+
+    drive     (6 + lags, N) commanded rudder rad, mean speed to the next row m/s, 1 where the speed is known,
+              interval to the next row s, time s, surge acceleration m/s^2; then, where the structure looks
+              back, earlier commands, newest first
+    measured  (2, N) pitch rad and depth m, 0 where missing
+    present   (2, N) 1 where measured, else 0
+    steps     (2,) of the rounding of pitch and depth where it rules, else 0
+    whitening  of pitch and of depth, where more than white noise is in them
+    shared     larger equations that are evaluated in place of the structure's own, if any; what these lack
+               acts nowhere where its parameters are 0, and moves no state of its own
+    """
+
+    structure: Structure
+    drive: Array
+    measured: Array
+    present: Array
+    substeps: int
+    steps: Array = field(default_factory=lambda: np.zeros(2))
+    whitening: Whitenings = NOT_WHITENED
+    shared: Structure | None = None
+
+    def of(self, structure: Structure, shared: Structure | None = None) -> "Inputs":
+        """What drives other equations over the same recording, which look back as far."""
+        return replace(self, structure=structure, shared=shared)
+
+    @property
+    def evaluated(self) -> Structure:
+        """The equations whose functions are built."""
+        return self.structure if self.shared is None else self.shared
+
+    @property
+    def own(self) -> tuple[int, ...]:
+        """The places of the structure's parameters among those of `evaluated`."""
+        return _places(self.structure.names, self.evaluated.names)
+
+    def widened(self, parameters: Array) -> Array:
+        """The structure's parameters among those of `evaluated`."""
+        if self.shared is None:
+            return parameters
+        values = np.zeros(len(self.shared.names))
+        values[list(self.own)] = parameters
+        return values
+
+
+@lru_cache
+def _places(own: tuple[str, ...], among: tuple[str, ...]) -> tuple[int, ...]:
+    return tuple(map(among.index, own))
+
+
+def inputs_of(
+    recording: Recording,
+    structure: Structure = BASE,
+    longest_substep: float = LONGEST_SUBSTEP,
+    steps: Array | None = None,
+    whitening: Whitenings = NOT_WHITENED,
+) -> Inputs:
+    """Inputs of one recording. Longer sub-steps (s) suit vehicles whose modes are known to be slow."""
+    intervals = recording.intervals
+    steps = np.zeros(2) if steps is None else steps
+    known = np.full(intervals.size, float(recording.has_speed))
+    speed = smoothed_speed(recording.speed).speed if recording.has_speed else np.zeros(intervals.size)
+    surge = np.append(np.diff(speed) / intervals[:-1], 0.0)
+    speed = np.append((speed[:-1] + speed[1:]) / 2.0, speed[-1:])  # from row to row it changes evenly
+    lags = int(np.ceil(LONGEST_DELAY / recording.step)) + 1 if structure.needs_lags else 0
+    earlier = [
+        np.concatenate([np.full(min(lag, intervals.size), recording.rudder[0]), recording.rudder])[
+            : intervals.size
+        ]
+        for lag in range(1, lags + 1)
+    ]
+    measured = np.vstack([recording.pitch, recording.depth])
+    present = np.isfinite(measured)
+    return Inputs(
+        structure=structure,
+        drive=np.vstack([recording.rudder, speed, known, intervals, recording.time, surge, *earlier]),
+        measured=np.where(present, measured, 0.0),
+        present=present.astype(float),
+        substeps=int(np.ceil(recording.step / max(longest_substep, recording.step / MOST_SUBSTEPS) - 1e-6)),
+        steps=steps,
+        whitening=whitening,
+    )
+
+
+def longest_substep(parameters: Array, step: float) -> float:
+    """Sub-step, s, that resolves the modes of a vehicle with these base parameters: a fifth of 1 / rate.
+
+    Twice the rate is allowed for, as effects to come may quicken it. What the plane does within a sub-step
+    counts by its mean and its moment, however quick; waves are the quickest that acts, and half of a row
+    between samples `step` s apart, or LONGEST_OF_ALL, is enough for those that can be seen.
+    """
+    a1, a2, a3 = parameters[:3]
+    fastest = max(abs(a1), abs(a2), abs(a3) ** 0.5)
+    longest = max(LONGEST_OF_ALL, step / 2.0)
+    return float(np.clip(0.4 / fastest, LONGEST_SUBSTEP, longest))
+
+
+@dataclass(frozen=True)
+class Form:
+    """What a CasADi function depends on: one is built for each form and kept."""
+
+    structure: Structure
+    substeps: int
+    drives: int
+
+    @property
+    def nx(self) -> int:
+        return len(self.structure.states)
+
+    @property
+    def np(self) -> int:
+        return len(self.structure.parameters)
+
+    def symbols(self) -> tuple[ca.SX, ca.SX, ca.SX]:
+        return ca.SX.sym("x", self.nx), ca.SX.sym("p", self.np), ca.SX.sym("drive", self.drives)
+
+    def step(self, x: ca.SX, p: ca.SX, drive: ca.SX) -> list[ca.SX]:
+        """The state after each sub-step; after the last it is that one row later."""
+        after = []
+        for k in range(self.substeps):
+            x = self.substep(x, p, drive, k)
+            after.append(x)
+        return after
+
+    def substep(
+        self, x: ca.SX, p: ca.SX, drive: ca.SX, k: int | ca.SX, slope: Callable[..., ca.SX] | None = None
+    ) -> ca.SX:
+        """The state after sub-step k of a row, counted from 0; `slope` may stand for `slope_of`."""
+        h = drive[3] / self.substeps
+        states = self.structure.states
+        slope = slope or slope_of(self)
+        time = drive[4] + k * h
+        at_start = self.structure.chain(x, p, drive, time)
+        moved = self.structure.actuate(at_start, h)
+        plane, half = at_start.plane, at_start.change / 2
+        k1 = slope(x, time, plane - half, p, drive)
+        k2 = slope(x + h / 2 * k1, time + h / 2, plane, p, drive)
+        k3 = slope(x + h / 2 * k2, time + h / 2, plane, p, drive)
+        k4 = slope(x + h * k3, time + h, plane + half, p, drive)
+        before, x = x, x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        for name, value in moved.items():
+            x[states.index(name)] = value
+        for name, followed, lag in self.structure.followers:
+            own, time_constant = states.index(name), p[self.structure.names.index(lag)]
+            start, slope_then = _followed(self, followed)(before, k1, p, drive)
+            end, slope_now = _followed(self, followed)(x, k4, p, drive)
+            bend = (slope_now - slope_then) / (2 * h)
+            x[own] = _behind(before[own], start, end, bend, time_constant, h)
+        return x
+
+    def outputs(self, x: ca.SX, p: ca.SX, drive: ca.SX) -> ca.SX:
+        return self.structure.outputs(self.structure.chain(x, p, drive, drive[4]))
+
+
+def _behind(y: ca.SX, start: ca.SX, end: ca.SX, bend: ca.SX, lag: ca.SX, h: ca.SX) -> ca.SX:
+    """y after h where lag y' = u - y and u goes from start to end on a parabola with u'' / 2 = bend.
+
+    Exact, as a lag may be shorter than any sub-step: Runge-Kutta would take it for a far longer one.
+    """
+    slope = (end - start) / h - bend * h  # at the start
+    settled_then = start - lag * slope + 2 * lag**2 * bend
+    settled_now = end - lag * (slope + 2 * bend * h) + 2 * lag**2 * bend
+    return settled_now + (y - settled_then) * ca.exp(-h / lag)
+
+
+@lru_cache(KEPT)
+def slope_of(form: Form) -> ca.Function:
+    """x' for a plane angle that is held; as a function of its own, as inlining it is quicker than tracing."""
+    x, p, drive = form.symbols()
+    time, plane = ca.SX.sym("time"), ca.SX.sym("plane")
+    chain = form.structure.chain(x, p, drive, time)
+    chain.plane = plane
+    return ca.Function("slope", [x, time, plane, p, drive], [form.structure.derivative(chain)])
+
+
+@lru_cache(KEPT)
+def _followed(form: Form, of: Callable[[Chain], ca.SX]) -> ca.Function:
+    """What a sensor follows with a lag, and its rate where the state moves so."""
+    x, p, drive = form.symbols()
+    rates, value = ca.SX.sym("rates", form.nx), of(form.structure.chain(x, p, drive, drive[4]))
+    return ca.Function("followed", [x, rates, p, drive], [value, ca.jtimes(value, x, rates)])
+
+
+@lru_cache(KEPT)
+def _initial(form: Form) -> ca.Function:
+    """All states at the first row, and their derivatives by the parameters and what a run begins with."""
+    x0, (_, p, drive) = ca.SX.sym("x0", NX0), form.symbols()
+    x = form.structure.initial(x0, p, drive)
+    slopes = ca.horzcat(ca.jacobian(x, p), ca.jacobian(x, x0))
+    return ca.Function("initial", [x0, p, drive], [x, slopes])
+
+
+@lru_cache(KEPT)
+def _free_run(form: Form) -> ca.Function:
+    x, p, drive = form.symbols()
+    *within, after = form.step(x, p, drive)
+    return ca.Function("free_run", [x, drive, p], [after, ca.vertcat(x, *within, form.outputs(x, p, drive))])
+
+
+def form_of(inputs: Inputs) -> Form:
+    """Of the functions that propagate this recording."""
+    return Form(inputs.evaluated, inputs.substeps, inputs.drive.shape[0])
+
+
+def begun_at(pitch: float, depth: float) -> Array:
+    """What a run begins with at this pitch, rad, and depth, m, in steady flight (5,)."""
+    return np.array([0.0, 0.0, pitch, depth, 0.0])
+
+
+def start_of(form: Form, parameters: Array, initial: Array, inputs: Inputs) -> tuple[Array, Array]:
+    """All states at the first row (nx,), and their derivatives by the parameters and by `initial` (5,)."""
+    x, slopes = _initial(form)(initial, inputs.widened(parameters), inputs.drive[:, 0])
+    columns = [*inputs.own, *range(form.np, form.np + NX0)]
+    return np.asarray(x, dtype=float).ravel(), np.asarray(slopes, dtype=float)[:, columns]
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What a vehicle did over N rows.
+
+    states   (nx, N)
+    outputs  (2, N) pitch and depth
+    within   (substeps, nx, N) states from which the sub-steps begin
+    """
+
+    states: Array
+    outputs: Array
+    within: Array
+
+
+def free_run(parameters: Array, initial: Array, inputs: Inputs) -> Run:
+    """Simulates from [w, q, theta, zeta, u / u0 - 1] (5,) at the first row, blind to the measurements."""
+    form = form_of(inputs)
+    start, _ = start_of(form, parameters, initial, inputs)
+    table = over_rows(_free_run, form, inputs.drive.shape[1])(start, inputs.drive, inputs.widened(parameters))
+    within = table[:-2].reshape((form.substeps, form.nx, -1))
+    return Run(states=within[0], outputs=table[-2:], within=within)

@@ -1,0 +1,1 @@
+"""The live run: measurements aligned, recorded, estimated from, and watched."""

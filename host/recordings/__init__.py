@@ -1,0 +1,1 @@
+"""Recordings before any model: read, put on the time grid, rid of what is no motion."""
