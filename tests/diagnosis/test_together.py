@@ -189,19 +189,26 @@ def test_a_hull_that_got_the_pole_of_its_plane_s_lag_gets_its_own_back() -> None
     assert search.tried[names].bic == found.bic
 
 
-@pytest.mark.parametrize(("left", "is_asked"), [(1.05, False), (1.6, True)])
-def test_what_drifts_is_asked_before_a_continuation(
-    left: float, is_asked: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("left", [1.05, 1.6])
+def test_where_much_is_left_it_is_asked_what_drifts(left: float, monkeypatch: pytest.MonkeyPatch) -> None:
     search, beside = Rounds([left], True, monkeypatch), SimpleNamespace()
     search.asks_drift = True
     monkeypatch.setattr(module, "plain_drift", lambda *_: beside)
-    assert (found(search) is None) is is_asked
-    assert (search.adrift is beside) is is_asked
-    assert search.continued == 0
-    monkeypatch.setattr(module, "plain_drift", lambda *_: None)
-    found(search)
-    assert search.continued == is_asked
+    assert (found(search) is None) is (left > 1.15)
+    assert (search.adrift is beside) is (left > 1.15)
+
+
+@pytest.mark.parametrize(("end", "is_adrift"), [(1.3, True), (1.02, False)])
+def test_what_drifts_gives_way_to_a_hull_that_a_continuation_finds(
+    end: float, is_adrift: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search, beside = Rounds([1.6], True, monkeypatch), SimpleNamespace()
+    search.asks_drift = True
+    hull = SimpleNamespace(names=frozenset({9}), fit=end, bic=-9000.0)
+    monkeypatch.setattr(module, "plain_drift", lambda *_: beside)
+    monkeypatch.setattr(module, "_by_continuation", lambda _: hull)
+    assert found(search) is (None if is_adrift else hull)
+    assert (search.adrift is beside) is is_adrift
 
 
 def test_what_led_nowhere_beside_less_is_not_tried_beside_more(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -70,11 +70,15 @@ def together(search: "Search", leading: Explanation, joint: Explanation) -> Expl
     if search.asks_drift and fitter.excess(best.fit) > LITTLE:
         search.on_progress("sensors that wander, gusts")
         search.adrift = plain_drift(fitter, best)
-        if search.adrift is not None:
-            return None
     may_be_led = fitter.excess(best.fit) < MUCH or not search.is_second
     if fitter.excess(best.fit) > LITTLE and may_be_led and (end := _by_continuation(search)) is not None:
-        best = with_more(search, min(end, best, key=lambda e: e.bic))
+        # What drifts can make up for a hull in another valley than the truth.
+        if fitter.excess(end.fit) < LITTLE:
+            search.adrift = None
+        if search.adrift is None:
+            best = with_more(search, min(end, best, key=lambda e: e.bic))
+    if search.adrift is not None:
+        return None
     if fitter.excess(best.fit) > LITTLE and is_above_floor(fitter, best.fit):
         is_out_of_reach = fitter.excess(best.fit) < MUCH and is_far(fitter, leading)
         return best if is_out_of_reach else None
