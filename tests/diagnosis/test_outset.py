@@ -35,6 +35,7 @@ from tools.trial.draw import draw
 SIMULATED = Path(__file__).parent.parent / "data" / "simulators" / "pvs_remus100__3211.csv"
 FEW = frozenset({"actuator_lag", "free_trim"})
 MANY = frozenset({*ORDINARY})
+TWO = frozenset({"actuator_lag", "munk_moment"})
 
 
 @pytest.fixture(scope="module")
@@ -236,13 +237,17 @@ def test_a_search_goes_on_with_many_or_begins_with_single_effects(
     monkeypatch.setattr(outset, "with_more", lambda _, best, **__: best)
     monkeypatch.setattr(outset, "pruned", lambda *_: found(pays))
     monkeypatch.setattr(module, "beam_search", lambda _: calls.append("singles"))
-    monkeypatch.setattr(Search, "_concluded", lambda _: calls.append("concluded"))
+    monkeypatch.setattr(Search, "_concluded", lambda _: calls.append("concluded") or found(MANY))
     fitter: Any = SimpleNamespace(excess=lambda fit: fit.left)
     root, base = found(frozenset({"free_trim"})), found(frozenset())
     search = Search(fitter, cast("Any", None), lambda _: None, base, root, outset=found(MANY))
     search.run()
     assert calls == said
     assert bool(search.joint) is (said == ["concluded"])
+    if said == ["concluded"]:
+        monkeypatch.setattr(Search, "_concluded", lambda _: calls.append("concluded") or found(TWO))
+        search.run()
+        assert calls[1:] == ["concluded", "singles", "concluded"]  # two that are left may stand for others
 
 
 @pytest.mark.parametrize("is_white", [True, False])

@@ -60,7 +60,7 @@ def exchanged(search: "Search", best: Explanation, settled: Names = frozenset())
     close = [search.remember(e) for e in search.workers.results([(Fitter.polished, (e,)) for e in close])]
     # Two members may stand for what one does that was not there: with it they are no longer needed.
     close = [e for e in close if e.bic < best.bic + margin(best)]
-    leaner = (pruned(search, e) if 1 < len(e.names) <= SMALL else e for e in close)
+    leaner = (pruned(search, e) if 1 < len(e.names) <= LARGEST_SET else e for e in close)
     rival = min(leaner, key=lambda e: e.bic, default=best)
     if rival.bic > best.bic - 0.01:
         return best

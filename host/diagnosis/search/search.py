@@ -47,8 +47,7 @@ class Search:
     alone  each effect alone, where these were fitted before
     rivals  sets that were fitted in an exchange
     joint   sets with all that every vehicle has
-    steered  what a continuation found likeliest while forces still steered the state; `at_sea` the same
-             among those that are likeliest beside it, once asked
+    steered  what a continuation found likeliest under forces; `at_sea` under the likeliest, once asked
     asks_drift  whether something may drift beside white noise; `adrift` a set beside that, where it is plain
     is_second  it was all searched with the plane the other way, too, where no continuation helped
     outset  the root with all that every vehicle has, where that leaves nothing, or next to nothing
@@ -88,7 +87,9 @@ class Search:
             found = self._settled(min(settled, key=lambda e: e.bic))
             return found if self.part is not None else told_by_the_usual(self, whole(self, found))
         if self.outset is not None and goes_on_from(self, self.outset):
-            return self._concluded()
+            found = self._concluded()
+            if len(found.names) >= SMALL:  # one or two may stand for others, in a valley of the many
+                return found
         beam_search(self)
         if self.is_led_elsewhere:
             return min((e for e in self.tried.values() if FREE_TRIM.name not in e.names), key=lambda e: e.bic)
