@@ -35,7 +35,6 @@ from tools.trial.draw import draw
 SIMULATED = Path(__file__).parent.parent / "data" / "simulators" / "pvs_remus100__3211.csv"
 FEW = frozenset({"actuator_lag", "free_trim"})
 MANY = frozenset({*ORDINARY})
-TWO = frozenset({"actuator_lag", "munk_moment"})
 
 
 @pytest.fixture(scope="module")
@@ -238,6 +237,8 @@ def test_a_search_goes_on_with_many_or_begins_with_single_effects(
     monkeypatch.setattr(outset, "pruned", lambda *_: found(pays))
     monkeypatch.setattr(module, "beam_search", lambda _: calls.append("singles"))
     monkeypatch.setattr(Search, "_concluded", lambda _: calls.append("concluded") or found(MANY))
+    single = found(frozenset({"free_trim", "actuator_delay"}), left + 61.0)
+    monkeypatch.setattr(Search, "singles", lambda _: [single])
     fitter: Any = SimpleNamespace(excess=lambda fit: fit.left)
     root, base = found(frozenset({"free_trim"})), found(frozenset())
     search = Search(fitter, cast("Any", None), lambda _: None, base, root, outset=found(MANY))
@@ -245,9 +246,9 @@ def test_a_search_goes_on_with_many_or_begins_with_single_effects(
     assert calls == said
     assert bool(search.joint) is (said == ["concluded"])
     if said == ["concluded"]:
-        monkeypatch.setattr(Search, "_concluded", lambda _: calls.append("concluded") or found(TWO))
+        single.bic = left + 59.0  # by its rough fit; many may do the work of one
         search.run()
-        assert calls[1:] == ["concluded", "singles", "concluded"]  # two that are left may stand for others
+        assert calls[1:] == ["concluded", "singles", "concluded"]
 
 
 @pytest.mark.parametrize("is_white", [True, False])
@@ -301,9 +302,9 @@ def test_a_diagnosis_begins_with_it_and_ranks_what_pays(real: Fitter) -> None:
     said: list[str] = []
     found = diagnose(real.recordings, said.append)
     named = [effect.name for effect in found.effects]
-    assert not any(line.startswith("1 effect") for line in said)
+    assert not any(line.startswith("2 effects") for line in said)
     assert found.verdict == "explained"
     assert "heave_pitch_rate_coupling" in named
     assert "munk_moment" not in named  # which this simulator has not
-    assert not found.is_ranked_alone
-    assert [name for name, _ in found.ranking] == named
+    assert found.is_ranked_alone
+    assert {*named} <= {name for name, _ in found.ranking}

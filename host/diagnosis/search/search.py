@@ -41,8 +41,7 @@ Progress = Callable[[str], None]
 class Search:
     """Explanations of some recordings, each set fitted once, best start kept.
 
-    base  the paper's equations alone, `root` the same with a free trim; all that is tried grows from it, with
-          random forces where the root has them
+    base  the paper's equations alone, `root` the same with a free trim, from which all grows
     part  the search, over an excerpt of the recordings or without random forces, that this one goes on from
     alone  each effect alone, where these were fitted before
     rivals  sets that were fitted in an exchange
@@ -88,8 +87,9 @@ class Search:
             return found if self.part is not None else told_by_the_usual(self, whole(self, found))
         if self.outset is not None and goes_on_from(self, self.outset):
             found = self._concluded()
-            if len(found.names) >= SMALL:  # one or two may stand for others, in a valley of the many
+            if min(e.bic for e in self.singles()) > found.bic + ROUGH:  # else many may do one's work
                 return found
+            self.alone = self.alone_so_far()
         beam_search(self)
         if self.is_led_elsewhere:
             return min((e for e in self.tried.values() if FREE_TRIM.name not in e.names), key=lambda e: e.bic)
