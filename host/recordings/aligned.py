@@ -17,7 +17,9 @@ from host.recordings.outliers import CHANNELS, outliers, told
 from host.recordings.recording import NEEDED, Array, Recording, split_at_gaps
 
 ONE_CHANNEL = 0.5  # of the rows that tell depth: at most so many tell pitch, too, where each has its own
+FEWEST = 10  # messages of either
 SAME_STEP = 0.1  # of the vehicle's step, by which a table's may differ
+SHORTEST = 1e-3  # s, of a step
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,14 +99,15 @@ def _spikes(measurements: list[Measurement]) -> list[int]:
 def is_of_messages(table: Recording) -> bool:
     """Whether each row tells one message, of one channel or a few, and hardly any both depth and pitch."""
     depth, pitch = np.isfinite(table.depth), np.isfinite(table.pitch)
-    return bool((depth & pitch).sum() < ONE_CHANNEL * min(depth.sum(), pitch.sum()))
+    fewer = min(depth.sum(), pitch.sum())
+    return bool(fewer >= FEWEST and (depth & pitch).sum() < ONE_CHANNEL * fewer)
 
 
 def aligned_table(table: Recording, config: AlignConfig, needs: tuple[str, ...] = NEEDED) -> list[Recording]:
     """A table of messages on the grid: at the vehicle's step, if pitch comes so, else at that of pitch."""
     usual = float(np.median(np.diff(table.time[np.isfinite(table.pitch)])))
     if abs(usual - config.step) > SAME_STEP * config.step:
-        config = AlignConfig(step=usual, rudder_on_change=config.rudder_on_change)
+        config = AlignConfig(step=max(usual, SHORTEST), rudder_on_change=config.rudder_on_change)
     note = f"its rows tell one message each: taken at every {config.step:.3g} s"
     messages = Messages(
         name=table.name,

@@ -94,3 +94,18 @@ def test_one_line_tells_where_the_channels_never_come_together(tmp_path: Path) -
     path.write_text("\n".join([HEADER, *early, *late]) + "\n")
     with pytest.raises(RecordingError, match="no stretch of 10 rows has depth, pitch, rudder together"):
         read_recordings(path, default_vehicle())
+
+
+@pytest.mark.parametrize("pitched", [1, 9])
+def test_a_channel_of_few_messages_makes_no_grid(pitched: int, tmp_path: Path) -> None:
+    path = tmp_path / "few.csv"
+    rows = [f"{0.1 * k:.1f},2{k % 7},,0.1,," for k in range(100)]
+    rows += [f"{20.0 + k},,0.1{k},0.1,," for k in range(pitched)]
+    path.write_text("\n".join([HEADER, *rows]) + "\n")
+    with pytest.raises(RecordingError, match="no stretch of 10 rows has depth, pitch, rudder together"):
+        read_recordings(path, default_vehicle())
+
+
+def test_messages_that_come_faster_than_any_grid_are_taken_at_the_finest(tmp_path: Path) -> None:
+    (recording,) = read_recordings(write(tmp_path / "dive.csv", step=5e-4, duration=1.0), default_vehicle())
+    assert recording.step == pytest.approx(1e-3)

@@ -1,9 +1,9 @@
 """A simulator's output on the recording's own rudder: the physics it holds against what the recording shows.
 
 The simulation is diagnosed like a recording, through far better sensors than the recording's own: its rows,
-its losses, and a tenth of its white noise, from a fixed seed. With as much noise one set of effects may do
-another's work; with none what its integrator leaves would be physics. What does not matter at the recording's
-noise drops out when the two are compared.
+its losses, and a tenth of its white noise (QUIETEST at least), from a fixed seed. With as much noise one set
+of effects may do another's work; with none what its integrator leaves would be physics. What does not matter
+at the recording's noise drops out when the two are compared.
 """
 
 from collections.abc import Callable
