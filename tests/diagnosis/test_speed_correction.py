@@ -1,5 +1,6 @@
 """A measured speed that errs, corrected by the surge equation."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -12,12 +13,16 @@ from host.diagnosis.against.comparison import compare
 from host.diagnosis.against.given_model import against_model
 from host.diagnosis.against.other_side import Side, side_of
 from host.diagnosis.diagnose import diagnose
+from host.diagnosis.fits.corrected_speed import speed_readings, strayed
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import SURGE, Fitter
+from host.diagnosis.fits.starts import begun_from
 from host.diagnosis.search.unknown_physics import known_in
+from host.diagnosis.search.whole_vehicle import ended
 from host.diagnosis.told.files import write_extended_model
 from host.dynamics.propagate import free_run, inputs_of
 from host.identification.model import read_model
+from host.likelihood.fit import Fit
 from host.recordings.recording import Array
 from host.vehicle import default_vehicle
 from tests.diagnosis.hidden_dive import BASE, DRAG, RECOVERY, slowing
@@ -45,6 +50,34 @@ def test_the_surge_equation_tells_what_a_noisy_sensor_does_not() -> None:
     assert value(corrected, "c_ud") == pytest.approx(DRAG * ratio**2, rel=0.1)
     assert value(corrected, "a1") == pytest.approx(BASE["a1"] * ratio, rel=0.05)
     assert value(corrected, "balanced_share") == pytest.approx(1.0 / ratio, rel=0.05)
+
+
+def test_a_speed_that_leaves_its_readings_is_charged_what_they_say_of_it() -> None:
+    fitter, taken, corrected = explained(0.1)
+
+    def charge(fit: Fit) -> float:
+        return strayed(fit, fitter.inputs(fit.structure.effect_names), [speed_readings(slowing(0.1))])
+
+    assert charge(corrected.fit) == charge(taken.fit) == 0.0
+    values = corrected.fit.parameters.copy()
+    values[corrected.fit.structure.names.index("c_ud")] *= 20.0
+    astray = replace(corrected.fit, parameters=values)
+    assert charge(astray) > 1e4
+    assert fitter.bic(astray, CORRECTED) > fitter.bic(corrected.fit, CORRECTED) + 1e4
+    alone = fitter.shrunk(corrected, "speed_loss")
+    assert charge(alone.fit) == 0.0  # which corrects nothing
+
+
+def test_a_speed_that_was_measured_well_is_not_taken_for_what_is_missing() -> None:
+    """A lever arm of the depth sensor, which the surge equation would make up for with absurd drag."""
+    dive = slowing(0.003)
+    ahead = replace(dive, depth=dive.depth - 2.0 * np.sin(dive.pitch))
+    fitter = Fitter([ahead])
+    names = frozenset(
+        {"speed_loss", "heave_quadratic_drag", "pitch_quadratic_damping", SPEED_CORRECTION.name}
+    )
+    found = ended(fitter, begun_from(fitter, fitter.root, names), names)
+    assert SPEED_CORRECTION.name not in found.names
 
 
 def test_a_correction_is_no_physics_and_is_not_named() -> None:

@@ -100,3 +100,16 @@ def test_sensitivities_that_ran_away_are_infinite_without_a_word() -> None:
     white, scores = whiten(np.full((2, 1), 1e-3), np.full((2, 1, 1), 1e307), variance)
     assert np.isfinite(white).all()
     assert not np.isfinite(scores).any()
+
+
+def test_what_a_run_begins_with_may_do_the_same_in_two_ways_and_much() -> None:
+    rng = np.random.default_rng(1)
+    scores = rng.standard_normal((2, len(NAMES) + 5, 200))
+    growing = np.full((2, 200), 2.0**40)  # of a hull that leaves the recording: rounding hides what differs
+    scores[:, -5] = scores[:, -4] = growing
+    values = np.zeros(len(NAMES))
+    values[NAMES.index("a1")], values[NAMES.index("a2")], values[NAMES.index("u0")] = -1.0, -1.0, 2.0
+    point = Point(STRUCTURE, values, [np.zeros(5)], np.array([1.0, 1.0, 0.0, 0.0]))
+    step = GaussNewton([(rng.standard_normal((2, 200)), scores)], point, FREE)
+    assert np.isfinite(step.trial(1e-3).parameters).all()
+    assert np.isfinite(step.promise())

@@ -11,6 +11,7 @@ from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE, SPEED_CORRECTION, h
 from host.catalogue.unknown import SPANS
 from host.diagnosis.fits.absence import one_step_without
 from host.diagnosis.fits.charges import charged_bic
+from host.diagnosis.fits.corrected_speed import SpeedReadings, speed_readings, strayed
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.first_guess import accelerations
 from host.diagnosis.fits.shared_equations import in_shared_equations
@@ -259,7 +260,14 @@ class Fitter:
     def bic(self, fit: Fit, names: Names) -> float:
         """Of a fit with the charges of its effects; see host.diagnosis.fits.charges."""
         longest = max(self.recordings, key=lambda recording: recording.duration)
-        return charged_bic(fit, names, self.free_parameters(names), longest)
+        charged = charged_bic(fit, names, self.free_parameters(names), longest)
+        if SPEED_CORRECTION.name not in names:
+            return charged
+        return charged + strayed(fit, self.inputs(names), self._speed_readings)
+
+    @cached_property
+    def _speed_readings(self) -> list[SpeedReadings]:
+        return [speed_readings(recording) for recording in self.recordings]
 
     def inputs(self, names: Names, for_filter: bool = False) -> list[Inputs]:
         """What drives the set's equations over each recording.

@@ -64,10 +64,13 @@ def with_all_ordinary(fitter: "Fitter", parent: Explanation) -> Explanation:
     In the likeliest of the valleys that the set alone can hardly tell apart.
     """
     fit, names = parent.fit, parent.names | {*ORDINARY, *FAINT}
-    names |= {SPEED_CORRECTION.name} & {*fitter.tools_beside(names)}
     here = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
     starts = [begun_beside(fitter, start, names) for start in (here, *look_alikes(here))]
-    return fitter.polished(fitter.explained(names, fitter.fitted(starts)))
+    found = fitter.polished(fitter.explained(names, fitter.fitted(starts)))
+    corrected = names | {SPEED_CORRECTION.name} & {*fitter.tools_beside(names)}
+    if corrected == names:
+        return found
+    return min(found, _ended(fitter, begun_from(fitter, found, corrected), corrected), key=lambda e: e.bic)
 
 
 def all_beside(fitter: "Fitter", leading: Explanation) -> Explanation:
@@ -92,8 +95,19 @@ def ended(fitter: "Fitter", start: Point, names: Names) -> Explanation:
     """A set of many from this start, polished where it leaves little.
 
     And from the heave of a usual hull, where the start has none: a set that lacks an effect may follow its
-    plane at once, and from there many lead nowhere.
+    plane at once, and from there many lead nowhere. A measured speed is taken as it is at first: what may
+    correct it would do the work of all that is not yet where it belongs, and lead elsewhere.
     """
+    if SPEED_CORRECTION.name not in names:
+        return _ended(fitter, start, names)
+    few = names - {SPEED_CORRECTION.name}
+    taken = _ended(fitter, begun_beside(fitter, start, few), few)
+    if taken.leaves_white and fitter.excess(taken.fit) < LITTLE:
+        return taken
+    return min(taken, _ended(fitter, begun_from(fitter, taken, names), names), key=lambda e: e.bic)
+
+
+def _ended(fitter: "Fitter", start: Point, names: Names) -> Explanation:
     starts = [start] if has_usual_heave(start) else [start, *with_usual_heave(start)]
     found = fitter.explained(names, fitter.fitted(starts, first=PATIENT))
     return fitter.polished(found) if fitter.excess(found.fit) < MUCH else found
