@@ -158,6 +158,8 @@ def test_what_no_hull_makes_of_its_water_is_doubted(
     assert verdict == ("partly_explained" if is_doubted else "explained")
     said = remaining(verdict, best, leftover(), misfit(1.0))
     assert ("larger than on any hull" in said) == is_doubted
+    beside = verdict_on(best, leftover(is_smooth=True), misfit(5.0), misfit(1.0))
+    assert beside == ("unexplained" if is_doubted else "partly_explained")
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ As catalogues can imitate, an explanation that leaves nothing is not yet a good 
 none of which every vehicle has, are less likely than one that the catalogue lacks; and so are large offsets
 that cancel, of which only the curve of one (a weight along a pitched hull, c_w0 (cos theta - 1)) remains.
 What the hull does late or twice passes for a short sea, too, if for one that is hardly likelier than others.
+And a hull that no water makes explains no part of what leaves something beside it.
 """
 
 from math import inf, pi, sqrt
@@ -70,7 +71,8 @@ def verdict_on(
         return "no_mismatch"
     if left.is_nothing and after.chi2 < worst and not unknown_in(best):
         return "explained" if foretells and not _doubt(best, waves) else "partly_explained"
-    return "partly_explained" if known_in(best) and after.chi2 < 0.7 * before.chi2 else "unexplained"
+    is_better = bool(known_in(best)) and after.chi2 < 0.7 * before.chi2
+    return "partly_explained" if is_better and not beyond_geometry_in(best) else "unexplained"
 
 
 def rare_in(explanation: Explanation) -> list[str]:
