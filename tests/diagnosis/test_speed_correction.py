@@ -15,7 +15,8 @@ from host.diagnosis.against.other_side import Side, side_of
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.fits.corrected_speed import speed_readings, strayed
 from host.diagnosis.fits.explanation import Explanation
-from host.diagnosis.fits.fitter import SURGE, Fitter
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.setting import SURGE
 from host.diagnosis.fits.starts import begun_from
 from host.diagnosis.search.unknown_physics import known_in
 from host.diagnosis.search.whole_vehicle import ended

@@ -9,8 +9,9 @@ import pytest
 from host.catalogue import structure_of
 from host.diagnosis.disturbances.seas import Explained, again_astray, led_astray
 from host.diagnosis.fits.explanation import Explanation
-from host.diagnosis.fits.fitter import SLIGHT, Fitter
+from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.leftover import leftover
+from host.diagnosis.fits.setting import SLIGHT
 from host.diagnosis.fits.speed_forces import densities
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.search.search import FAR_LIKELIER, LOST, Search

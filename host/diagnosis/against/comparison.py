@@ -19,8 +19,9 @@ from scipy.stats import chi2
 from host.catalogue import named
 from host.diagnosis.against.other_side import TOOLS, Side, Value, at_speed, in_words_of, side_of, there
 from host.diagnosis.fits.explanation import Explanation
-from host.diagnosis.fits.fitter import SURGE, Fitter
+from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import NAMING_MARGIN
+from host.diagnosis.fits.setting import SURGE
 from host.dynamics.equations import NAMES, PARAMETERS
 
 SIGNIFICANCE = 1e-3  # chance that one of two equal coefficients is called different

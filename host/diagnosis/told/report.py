@@ -11,7 +11,7 @@ from host.catalogue.moments import SCANS
 from host.diagnosis.against.comparison import Status, figure
 from host.diagnosis.answer import Against, Answer
 from host.diagnosis.diagnose import Diagnosis, NamedEffect
-from host.diagnosis.fits.fitter import SURGE
+from host.diagnosis.fits.setting import SURGE
 from host.diagnosis.proof.deviations import interval
 from host.diagnosis.proof.scoring import Misfit
 from host.diagnosis.search.unknown_physics import unknown_in
