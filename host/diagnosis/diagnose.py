@@ -35,6 +35,7 @@ from host.identification.identifiability import ambiguity
 from host.noise.noise_floor import noise_floor
 from host.recordings.outliers import without_outliers
 from host.recordings.recording import Array, Recording
+from host.recordings.signs import check_signs
 
 HORIZON = 5.0  # s
 MOST_WORTH = 1e9  # of BIC: without some effects the equations run away
@@ -112,12 +113,13 @@ def diagnose(
     like  an explanation of a vehicle that this one should resemble: if of many effects, it is begun with
     may_be_quiet  whether recordings that are smoother than sensors are taken as they are
 
-    Raises RecordingError with one line where a recording is too short, or pitch or depth never changes or
-    is hardly ever read.
+    Raises RecordingError with one line where a recording is too short, or pitch or depth never changes, is
+    hardly ever read or has the wrong sign.
     """
     check_usable(recordings)
     on_progress("base model")
     seen = without_outliers(with_plane_told(recordings))
+    check_signs(seen)
     seen = seen if may_be_quiet else as_sensed(seen)
     first, *others = likelier_first(ways(seen), on_progress, jobs)
     return _diagnosed(first, others, on_progress, jobs, like, [])

@@ -19,6 +19,7 @@ from host.noise.whiteness import is_white
 from host.recordings.outliers import without_outliers
 from host.recordings.plane_between_rows import with_moving_plane
 from host.recordings.recording import Array, Recording
+from host.recordings.signs import check_signs
 from host.vehicle import Vehicle
 
 Method = Literal["car", "mils", "robust", "ml"]
@@ -28,6 +29,8 @@ HELD_OUT_SHARE = 0.3
 FEWEST_ROWS = 10  # of a stretch to learn from
 CLEARLY = 6.0  # of BIC: odds of 20 to 1
 UNKNOWN = 1e4  # of a standard deviation in SI: the recording says nothing at all
+
+CLEARLY_POSITIVE = 4.0  # deviations
 
 Progress = Callable[[str], None]
 
@@ -83,8 +86,11 @@ def identify(
     Spikes are left out first, of what is learnt from and of what judges. Method ml asks the motion whether
     the plane held its angles between rows or moved on; for the others, which a vehicle runs on its own
     commands, it held them.
+
+    Raises RecordingError with one line where depth and pitch have opposite signs.
     """
     recordings, others = without_outliers(recordings), []
+    check_signs(recordings)
     if method == "ml":
         recordings, *others = _between_rows(recordings, on_progress)
     model, fit, history = learnt = _learn(recordings, vehicle, method, on_progress)
@@ -104,7 +110,7 @@ def identify(
         predictions=[predict(model, recording) for recording in recordings if _can_predict(recording)],
         held_out=held_out,
         undetermined=_open(model, fit),
-        notes=_notes(fit, method),
+        notes=_notes(fit, method) + _on_the_plane(model),
         fit=fit,
         history=history,
     )
@@ -221,6 +227,16 @@ def _notes(fit: Fit | None, method: Method) -> list[str]:
     if at_bound:
         notes.append(f"At the edge of what is physically possible: {', '.join(at_bound)}.")
     return notes
+
+
+def _on_the_plane(model: VehicleModel) -> list[str]:
+    """A note where it turns the hull the other way than the convention has it."""
+    if not model.values["b2"] > CLEARLY_POSITIVE * model.std["b2"]:
+        return []
+    return [
+        "A positive plane angle pitches the nose up here (b2 > 0), against the convention: if the plane is "
+        "not mounted so, change the sign of the rudder in the vehicle file."
+    ]
 
 
 def _wandering(fit: Fit) -> str:

@@ -46,3 +46,10 @@ def test_a_plane_that_never_moves_is_told() -> None:
     assert with_plane_told(both) is both
     (told,) = with_plane_told([still])
     assert told.notes[-1].startswith("the plane never moves: nothing is learnt of what it does")
+
+
+def test_a_plane_in_degrees_is_told() -> None:
+    dive = hidden_dive(duration=30.0)
+    (told,) = with_plane_told([replace(dive, rudder=np.rad2deg(dive.rudder))])
+    assert told.notes[-1].startswith("the plane was at up to 14.")
+    assert with_plane_told([dive])[0].notes == dive.notes

@@ -9,6 +9,7 @@ from host.errors import RecordingError
 from host.recordings.recording import Recording
 
 SHORTEST = 10.0  # s
+LARGEST_ANGLE = 1.6  # rad
 
 
 def check_usable(recordings: list[Recording]) -> None:
@@ -28,10 +29,18 @@ def check_usable(recordings: list[Recording]) -> None:
 
 
 def with_plane_told(recordings: list[Recording]) -> list[Recording]:
-    """With a note where the plane never moves: what was read may be something else."""
-    if any(np.ptp(recording.rudder) > 0.0 for recording in recordings):
+    """With a note where the plane never moves, or further than it can: it may be something else."""
+    largest = max(float(np.abs(recording.rudder).max()) for recording in recordings)
+    if not any(np.ptp(recording.rudder) > 0.0 for recording in recordings):
+        note = (
+            "the plane never moves: nothing is learnt of what it does "
+            "(is its column or message the right one?)"
+        )
+    elif largest > LARGEST_ANGLE:
+        note = (
+            f"the plane was at up to {largest:.3g} rad, if these are angles: in degrees, or a pulse width, "
+            "they need a unit or a scale in the vehicle file"
+        )
+    else:
         return recordings
-    note = (
-        "the plane never moves: nothing is learnt of what it does (is its column or message the right one?)"
-    )
     return [replace(recording, notes=(*recording.notes, note)) for recording in recordings]
