@@ -24,7 +24,7 @@ from host.diagnosis.proof.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.proof.verdict import Verdict, remaining, verdict_on
 from host.diagnosis.recordings.sensed import as_sensed
 from host.diagnosis.recordings.spans import Spans, divide, excerpt
-from host.diagnosis.recordings.usable import check_usable, with_plane_told
+from host.diagnosis.recordings.usable import check_usable, noted, with_plane_told
 from host.diagnosis.search.candidates import eligible
 from host.diagnosis.search.exchange import twins
 from host.diagnosis.search.search import Search
@@ -33,9 +33,9 @@ from host.diagnosis.search.whole_vehicle import beside_all, in_the_valley_of, wi
 from host.dynamics.equations import NAMES, Slot
 from host.identification.identifiability import ambiguity
 from host.noise.noise_floor import noise_floor
+from host.recordings.consistency import check_signs, units_note
 from host.recordings.outliers import without_outliers
 from host.recordings.recording import Array, Recording
-from host.recordings.signs import check_signs
 
 HORIZON = 5.0  # s
 MOST_WORTH = 1e9  # of BIC: without some effects the equations run away
@@ -120,6 +120,7 @@ def diagnose(
     on_progress("base model")
     seen = without_outliers(with_plane_told(recordings))
     check_signs(seen)
+    seen = noted(seen, units_note(seen))
     seen = seen if may_be_quiet else as_sensed(seen)
     first, *others = likelier_first(ways(seen), on_progress, jobs)
     return _diagnosed(first, others, on_progress, jobs, like, [])

@@ -16,10 +16,10 @@ from host.identification.uncertainty import covariance, covariance_within
 from host.likelihood.fit import Fit
 from host.likelihood.maximum_likelihood import fit_maximum_likelihood
 from host.noise.whiteness import is_white
+from host.recordings.consistency import check_signs, units_note
 from host.recordings.outliers import without_outliers
 from host.recordings.plane_between_rows import with_moving_plane
 from host.recordings.recording import Array, Recording
-from host.recordings.signs import check_signs
 from host.vehicle import Vehicle
 
 Method = Literal["car", "mils", "robust", "ml"]
@@ -91,6 +91,7 @@ def identify(
     """
     recordings, others = without_outliers(recordings), []
     check_signs(recordings)
+    told = units_note(recordings)
     if method == "ml":
         recordings, *others = _between_rows(recordings, on_progress)
     model, fit, history = learnt = _learn(recordings, vehicle, method, on_progress)
@@ -110,7 +111,7 @@ def identify(
         predictions=[predict(model, recording) for recording in recordings if _can_predict(recording)],
         held_out=held_out,
         undetermined=_open(model, fit),
-        notes=_notes(fit, method) + _on_the_plane(model),
+        notes=[*_notes(fit, method), *_on_the_plane(model), *([told] if told else [])],
         fit=fit,
         history=history,
     )

@@ -15,6 +15,7 @@ from host.recordings.resampled import readings_alone
 
 CHANNELS = ("depth", "pitch", "rudder", "speed", "pitch_rate")
 _MANY = 0.1  # share of a column
+_LONGEST_STEP = 30.0  # s
 
 
 def read_csv_recording(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> list[Recording]:
@@ -70,6 +71,12 @@ def read_table(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> 
         raise RecordingError(
             f"{path}: only {int(keep.sum())} rows have a time that advances; at least 10 are needed"
         )
+    step = float(np.median(np.diff(values["time"])))
+    if step > _LONGEST_STEP:
+        raise RecordingError(
+            f"{path}: rows are {step:.3g} s apart, too far to see any motion; a time in milliseconds needs "
+            'unit = "ms" under [csv.time]'
+        )
     return Recording(
         name=path.name,
         sha256=file_sha256(path),
@@ -79,7 +86,7 @@ def read_table(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> 
         rudder=values["rudder"],
         speed=values["speed"],
         pitch_rate=values["pitch_rate"],
-        step=float(np.median(np.diff(values["time"]))),
+        step=step,
         has_angle=columns.rudder.unit != "raw" or columns.rudder.scale != 1.0,
         counts=counts,
     )

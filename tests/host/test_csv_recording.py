@@ -139,6 +139,14 @@ def test_a_column_in_another_unit_is_refused(tmp_path: Path) -> None:
         read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
 
 
+def test_a_time_in_milliseconds_is_told(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", rows(50, step=100.0))
+    with pytest.raises(RecordingError, match=r'rows are 100 s apart.*unit = "ms" under \[csv.time\]'):
+        read_csv_recording(path, CsvMap())
+    (recording,) = read_csv_recording(path, CsvMap(time=CsvColumn(column="time_s", unit="ms")))
+    assert recording.step == pytest.approx(0.1)
+
+
 def test_a_column_that_is_there_twice_is_refused(tmp_path: Path) -> None:
     lines = [line + ",0.0" for line in rows(20)]
     with pytest.raises(RecordingError, match="'depth_m' is in the file 2 times"):

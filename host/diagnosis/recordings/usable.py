@@ -30,7 +30,8 @@ def check_usable(recordings: list[Recording]) -> None:
 
 def with_plane_told(recordings: list[Recording]) -> list[Recording]:
     """With a note where the plane never moves, or further than it can: it may be something else."""
-    largest = max(float(np.abs(recording.rudder).max()) for recording in recordings)
+    note: str | None
+    largest = max(float(np.abs(recording.rudder).max()) * recording.has_angle for recording in recordings)
     if not any(np.ptp(recording.rudder) > 0.0 for recording in recordings):
         note = (
             "the plane never moves: nothing is learnt of what it does "
@@ -38,9 +39,16 @@ def with_plane_told(recordings: list[Recording]) -> list[Recording]:
         )
     elif largest > LARGEST_ANGLE:
         note = (
-            f"the plane was at up to {largest:.3g} rad, if these are angles: in degrees, or a pulse width, "
-            "they need a unit or a scale in the vehicle file"
+            f"the plane was at up to {largest:.3g} rad, further than any can be: degrees or pulse widths "
+            "need a unit or a scale in the vehicle file"
         )
     else:
+        note = None
+    return noted(recordings, note)
+
+
+def noted(recordings: list[Recording], note: str | None) -> list[Recording]:
+    """The recordings with a note more, if there is one."""
+    if note is None:
         return recordings
     return [replace(recording, notes=(*recording.notes, note)) for recording in recordings]

@@ -1,4 +1,4 @@
-"""Depth that is given positive up, or pitch nose down: one line says so before physics is named for it."""
+"""Depth positive up, pitch nose down, other units: one line says so before physics is named for it."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,8 +9,8 @@ import pytest
 from host.diagnosis.diagnose import diagnose
 from host.errors import RecordingError
 from host.identification.identify import identify
+from host.recordings.consistency import check_signs, depth_by_pitch, units_note
 from host.recordings.recording import Recording
-from host.recordings.signs import check_signs, depth_by_pitch
 from host.vehicle import default_vehicle
 from tests.diagnosis.hidden_dive import hidden_dive, slowing
 
@@ -27,7 +27,7 @@ def nose_down(recording: Recording) -> Recording:
 @pytest.mark.parametrize("dive", [hidden_dive(duration=60.0), slowing(0.05)])
 def test_one_wrong_sign_is_told(turned: Callable[[Recording], Recording], dive: Recording) -> None:
     check_signs([dive])
-    assert depth_by_pitch([dive]) > 0.9
+    assert depth_by_pitch([dive])[0] > 0.9
     with pytest.raises(RecordingError, match=r"the vehicle sinks where its nose is up .*sign = -1") as told:
         check_signs([turned(dive)])
     assert "\n" not in str(told.value)
@@ -46,12 +46,11 @@ def test_gaps_and_recordings_that_say_nothing_are_no_wrong_signs() -> None:
     holed = replace(
         dive, depth=np.where(holes, np.nan, dive.depth), pitch=np.where(holes, dive.pitch, np.nan)
     )
-    assert depth_by_pitch([holed]) > 0.9
+    assert depth_by_pitch([holed])[0] > 0.9
     level = replace(dive, pitch=np.zeros_like(dive.pitch))
     silent = replace(dive, pitch=np.full_like(dive.pitch, np.nan))
-    assert (
-        depth_by_pitch([level]) == depth_by_pitch([silent]) == depth_by_pitch([dive.between(0.0, 4.0)]) == 0.0
-    )
+    for nothing in (level, silent, dive.between(0.0, 4.0)):
+        assert depth_by_pitch([nothing]) == (0.0, 0.0)
     assert depth_by_pitch([silent, dive]) == pytest.approx(depth_by_pitch([dive]))
 
 
@@ -63,3 +62,14 @@ def test_a_plane_that_is_mounted_the_other_way_is_noted() -> None:
     )
     assert not any("against the convention" in note for note in there.notes)
     assert any("b2 > 0), against the convention" in note for note in back.notes)
+
+
+def test_depth_in_feet_and_speed_in_knots_are_noted_where_the_speed_is_measured() -> None:
+    dive = slowing(0.05)
+    feet, knots = replace(dive, depth=dive.depth / 0.3048), replace(dive, speed=dive.speed * 0.5144)
+    assert units_note([dive]) is None
+    assert units_note([replace(feet, speed=np.full_like(dive.speed, np.nan))]) is None
+    assert "depth changes 5.7 times as fast" in (units_note([feet]) or "")
+    assert "depth changes 3.4 times as fast" in (units_note([knots]) or "")
+    found = identify([feet], default_vehicle())
+    assert any("in another unit" in note for note in found.notes)
