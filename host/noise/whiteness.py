@@ -7,6 +7,7 @@ from scipy.stats import chi2
 
 from host.recordings.recording import Array
 
+SLOWER = 0.6  # of the rows with a reading: fewer are those of a sensor that is slower
 SLOW_SPREAD = 2.3  # of the cumulative periodogram (Kolmogorov's distribution at 5e-5)
 
 
@@ -20,6 +21,15 @@ def _centred(values: Array) -> Array:
     """The values (N,) less their mean, 0 where NaN."""
     present = np.isfinite(values)
     return np.where(present, values - values[present].mean(), 0.0)
+
+
+def _readings(values: Array) -> Array:
+    """The values (N,) of a sensor slower than the rows one after the other, else as they are.
+
+    Of every other row, say, odd lags have no pairs, and the power repeats itself along the spectrum.
+    """
+    known = values[np.isfinite(values)]
+    return known if known.size < SLOWER * values.size else values
 
 
 def _lagged_sums(values: Array, lags: int) -> Array:
@@ -52,7 +62,7 @@ def is_white(innovations: Array, lags: int = 20, significance: float = 0.001, sl
     its step and next to nothing inside; of equal variances such innovations would look coloured.
     A row of few values, or that never changes, tells nothing against it, nor do correlations up to `slack`.
     """
-    for values in innovations:
+    for values in map(_readings, innovations):
         present = values[np.isfinite(values)]
         if present.size < 3 * lags or np.ptp(present) == 0.0:
             continue
@@ -71,7 +81,7 @@ def is_even(innovations: Array, slack: float = 0.0) -> bool:
     Kolmogorov's distance of the cumulative periodogram from a straight line, whatever the variances. A
     correlation r_k at lag k adds 2 / pi r_k sin(omega k) / k; one of `slack` at a single lag is no sign.
     """
-    for values in innovations:
+    for values in map(_readings, innovations):
         known = np.isfinite(values)
         if known.sum() < 100 or np.ptp(values[known]) == 0.0:
             continue
