@@ -23,7 +23,13 @@ USUAL = 0.55, 1.8  # of d zeta over d P
 
 
 def check_signs(recordings: list[Recording]) -> None:
-    """Raises RecordingError with one line where the vehicle sinks as its nose goes up, all along."""
+    """Raises RecordingError with one line where the vehicle sinks as its nose goes up, or goes astern."""
+    speeds = np.concatenate([recording.speed for recording in recordings])
+    if np.isfinite(speeds).any() and np.nanmean(speeds) < 0.0:
+        raise RecordingError(
+            f"{recordings[0].name}: the measured speed is negative ({np.nanmean(speeds):.2g} m/s on the "
+            "mean): ahead is positive; put sign = -1 under [csv.speed]"
+        )
     r, _ = depth_by_pitch(recordings)
     if r < OPPOSED:
         raise RecordingError(

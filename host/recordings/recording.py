@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 NEEDED = ("depth", "pitch", "rudder")
 LONGEST_BETWEEN_SPEEDS = 2.5  # s, between two readings: a manoeuvre slows the vehicle within a few
+STANDING = 0.02  # m/s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,15 +111,21 @@ def split_at_gaps(
 
 
 def _with_useful_speed(piece: Recording) -> Recording:
-    """Speed varies slowly, so its sensor may be slow; one that is silent half of the time tells none."""
+    """Speed varies slowly, so its sensor may be slow; one that is silent half of the time tells none.
+
+    Nor does one that reads zero while the vehicle swims: without bottom lock, or a receiver under water.
+    """
     known = np.flatnonzero(np.isfinite(piece.speed))
     steps = np.diff(piece.time[known])
+    note = ""
     if known.size and steps[steps <= LONGEST_BETWEEN_SPEEDS].sum() < 0.5 * piece.duration:
         note = "the speed is known in less than half of the time, so none is taken as measured"
-        return replace(
-            piece, speed=np.full_like(piece.speed, np.nan), notes=tuple(dict.fromkeys((*piece.notes, note)))
-        )
-    return piece
+    elif known.size and np.abs(piece.speed[known]).max() < STANDING:
+        note = "the speed is said to be zero all along, so none is taken as measured"
+    if not note:
+        return piece
+    notes = tuple(dict.fromkeys((*piece.notes, note)))
+    return replace(piece, speed=np.full_like(piece.speed, np.nan), notes=notes)
 
 
 def mean_speed(recordings: list[Recording]) -> float:

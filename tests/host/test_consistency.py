@@ -33,6 +33,12 @@ def test_one_wrong_sign_is_told(turned: Callable[[Recording], Recording], dive: 
     assert "\n" not in str(told.value)
 
 
+def test_a_speed_astern_is_told() -> None:
+    dive = slowing(0.05)
+    with pytest.raises(RecordingError, match=r"the measured speed is negative .*\[csv.speed\]"):
+        check_signs([replace(dive, speed=-dive.speed)])
+
+
 def test_bench_commands_stop_there() -> None:
     wrong = [rising(hidden_dive(duration=60.0))]
     for command in (lambda: diagnose(wrong), lambda: identify(wrong, default_vehicle())):

@@ -92,6 +92,13 @@ def test_a_speed_that_is_silent_half_of_the_time_is_no_speed_and_that_is_said(tm
     assert any("speed" in note for note in recording.notes)
 
 
+def test_a_speed_of_zero_all_along_is_no_speed_and_that_is_said(tmp_path: Path) -> None:
+    lines = [f"{line},0.0" for line in rows(50)]
+    (recording,) = read_csv_recording(write(tmp_path / "a.csv", lines, f"{HEADER},speed_mps"), CsvMap())
+    assert not recording.has_speed
+    assert recording.notes == ("the speed is said to be zero all along, so none is taken as measured",)
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
