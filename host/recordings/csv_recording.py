@@ -12,6 +12,7 @@ from host.errors import RecordingError
 from host.recordings.csv_map import UNITS, CsvColumn, CsvMap
 from host.recordings.recording import NEEDED, Array, Recording, file_sha256, split_at_gaps
 from host.recordings.resampled import readings_alone
+from host.recordings.rounded_time import evenly_told
 
 CHANNELS = ("depth", "pitch", "rudder", "speed", "pitch_rate")
 _MANY = 0.1  # share of a column
@@ -65,7 +66,19 @@ def read_table(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> 
                 f"{path}: column {column.column!r} for {quantity} is not in the file "
                 f"(it has: {', '.join(header)}); name yours in the vehicle file under [csv.{quantity}]"
             )
+    if np.isnan(values["time"]).all() and rows:
+        named = columns.time.column
+        example = next((cells[header.index(named)] for cells in rows if len(cells) > header.index(named)), "")
+        raise RecordingError(
+            f"{path}: column {named!r} for time holds no numbers (got {example!r}), as seconds are"
+        )
+    notes: tuple[str, ...] = ()
+    if (even := evenly_told(values["time"])) is not None and not _is_written_twice(values):
+        values["time"], step = even
+        notes = (f"its times are rounded to {step:.3g} s: the rows are taken as evenly spaced",)
     keep = _advancing(values["time"], counts)
+    if counts["refused.time_not_advancing"] > _MANY * len(rows) and not _is_written_twice(values):
+        notes += ("many rows repeat the time of the row before, and are left out: is it rounded?",)
     values = {quantity: column[keep] for quantity, column in values.items()}
     if keep.sum() < 10:
         raise RecordingError(
@@ -89,7 +102,16 @@ def read_table(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> 
         step=step,
         has_angle=columns.rudder.unit != "raw" or columns.rudder.scale != 1.0,
         counts=counts,
+        notes=notes,
     )
+
+
+def _is_written_twice(values: dict[str, Array]) -> bool:
+    """Whether rows of one time mostly say the same: then they are one row."""
+    again = np.flatnonzero(np.diff(values["time"]) == 0.0)
+    channels = np.array([values[name] for name in CHANNELS])
+    same = (channels[:, again] == channels[:, again + 1]) | np.isnan(channels[:, again])
+    return bool(np.mean(same.all(axis=0)) > 0.5)
 
 
 def _read_rows(path: Path) -> tuple[list[str], list[list[str]], str]:

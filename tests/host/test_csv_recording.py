@@ -77,6 +77,28 @@ def test_time_running_backwards_and_repeated_is_dropped_and_counted(tmp_path: Pa
     assert recording.counts["refused.time_missing"] == 1
 
 
+@pytest.mark.parametrize("decimals", [0, 1])
+def test_rows_of_rounded_times_are_spread_evenly(tmp_path: Path, decimals: int) -> None:
+    step = 0.1 if decimals == 0 else 0.02
+    lines = [f"{round(7.3 + step * k, decimals)},{10 + 0.01 * k:.4f},{0.001 * k:.4f},0.1" for k in range(200)]
+    (recording,) = read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
+    assert recording.time == pytest.approx(step * np.arange(200), abs=0.1 * step * 10**-decimals / step)
+    assert recording.step == pytest.approx(step, rel=0.01)
+    assert recording.notes == (
+        f"its times are rounded to {10**-decimals:.3g} s: the rows are taken as evenly spaced",
+    )
+
+
+def test_times_that_repeat_without_a_pace_or_rows_written_twice_are_dropped(tmp_path: Path) -> None:
+    paused = [f"{int(0.1 * k) + 30 * (k > 100)},{10 + 0.01 * k:.4f},{0.001 * k:.4f},0.1" for k in range(200)]
+    twice = [line for line in rows(50) for _ in range(2)]
+    for lines, left, is_noted in ((paused, 21, True), (twice, 50, False)):
+        found = read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
+        assert sum(recording.time.size for recording in found) == left
+        assert found[0].counts["refused.time_not_advancing"] == len(lines) - left
+        assert ("many rows repeat" in " ".join(found[0].notes)) == is_noted
+
+
 @pytest.mark.parametrize("every", [1, 3, 10, 20])
 def test_a_slow_speed_sensor_is_one(tmp_path: Path, every: int) -> None:
     lines = [f"{line},{2.0 + 0.01 * k if k % every == 0 else ''}" for k, line in enumerate(rows(60))]
@@ -107,7 +129,7 @@ def test_a_speed_of_zero_all_along_is_no_speed_and_that_is_said(tmp_path: Path) 
         (b"time_s,depth_m,pitch_rad\n0,1,2\n", "column 'rudder_rad' for rudder is not in the file"),
         (HEADER.encode() + b"\n0,1,0,0\n", "only 1 rows"),
         (HEADER.encode() + b"\n" + b"\n".join(b"%d,,,0" % k for k in range(20)), "no stretch of 10 rows"),
-        (HEADER.encode() + b"\n" + b"\n".join(b"a,b,c,d" for _ in range(20)), "only 0 rows"),
+        (HEADER.encode() + b"\n" + b"\n".join(b"a,b,c,d" for _ in range(20)), "for time holds no numbers"),
     ],
 )
 def test_bad_file_says_what_is_wrong_in_one_line(tmp_path: Path, content: bytes, message: str) -> None:
@@ -143,6 +165,12 @@ def test_a_column_in_another_unit_is_refused(tmp_path: Path) -> None:
     with pytest.raises(
         RecordingError, match=r"pitch must be within 3\.142 .*got 19 from 'pitch_rad'.*\[csv\.pitch\]"
     ):
+        read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
+
+
+def test_a_time_of_day_is_no_number(tmp_path: Path) -> None:
+    lines = [f"12:00:{k:02d},10,{0.01 * k},0.1" for k in range(50)]
+    with pytest.raises(RecordingError, match=r"column 'time_s' for time holds no numbers .*'12:00:00'"):
         read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
 
 
