@@ -207,3 +207,24 @@ def test_waves_that_are_hardly_likelier_than_none_are_doubted(
     assert verdict_on(best, leftover(), misfit(5.0), misfit(1.0), evidence) == verdict
     said = remaining(verdict, best, leftover(), misfit(4.0), evidence)
     assert ("waves are hardly likelier" in said) == (verdict == "partly_explained")
+
+
+@pytest.mark.parametrize(
+    ("munk", "moment", "is_by_speed", "verdict"),
+    [
+        (8.0, 1e-12, False, "partly_explained"),
+        (8.0, 1e-12, True, "explained"),
+        (8.0, 1e-4, False, "explained"),
+        (1.0, 1e-12, False, "explained"),  # a Munk moment that is hardly known
+    ],
+)
+def test_forces_that_push_a_hull_and_do_not_turn_it_are_no_sea(
+    base: Explanation, munk: float, moment: float, is_by_speed: bool, verdict: Verdict
+) -> None:
+    best = explanation_with(base, frozenset({"munk_moment"}), values_of(base) | {"c_qw": munk})
+    noise = np.array([*base.fit.noise[:2], 1e-5, moment])
+    best = replace(best, fit=replace(best.fit, noise=noise))
+    left = replace(leftover(), is_by_speed=is_by_speed)
+    assert verdict_on(best, left, misfit(40.0), misfit(20.0)) == verdict
+    said = remaining(verdict, best, left, misfit(20.0))
+    assert ("do not turn it" in said) == (verdict == "partly_explained")

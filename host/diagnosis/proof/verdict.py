@@ -4,6 +4,7 @@ As catalogues can imitate, an explanation that leaves nothing is not yet a good 
 none of which every vehicle has, are less likely than one that the catalogue lacks; and so are large offsets
 that cancel, of which only the curve of one (a weight along a pitched hull, c_w0 (cos theta - 1)) remains.
 What the hull does late or twice passes for a short sea, too, if for one that is hardly likelier than others.
+So do forces of no sea: what moves the water around a hull turns it as well as it pushes it.
 And a hull that no water makes explains no part of what leaves something beside it.
 """
 
@@ -46,6 +47,8 @@ NO_COUPLING = 2.0  # times the forward speed: masses allow for less than one (ho
 NO_MUNK = 6.0  # times what all of heave's damping would do at the plane
 LEAST_LEVER = 1.0  # 1/m, of the plane's moment over its force: less is a plane amidships
 LARGEST_SHARE = 4.0  # of what geometry gives, that bounds allow
+CERTAIN = 3.0  # deviations of a Munk moment
+HARDLY_TURNED = 0.01  # of the density of the moment that moving water has beside its force
 NEARLY = 1.0 - 1e-6  # of a bound: at it
 KNOWN = 1.0 / 3.0  # of it, is what a deviation may be there, if to end at a bound is to tell anything
 
@@ -70,7 +73,7 @@ def verdict_on(
     if left.is_nothing and after.chi2 < WORSE and best.names == minute_in(best):
         return "no_mismatch"
     if left.is_nothing and after.chi2 < worst and not unknown_in(best):
-        return "explained" if foretells and not _doubt(best, waves) else "partly_explained"
+        return "explained" if foretells and not _doubt(best, left, waves) else "partly_explained"
     is_better = bool(known_in(best)) and after.chi2 < 0.7 * before.chi2
     return "partly_explained" if is_better and not beyond_geometry_in(best) else "unexplained"
 
@@ -141,10 +144,29 @@ def beyond_geometry_in(explanation: Explanation) -> list[str]:
     return [name for name, size in sizes.items() if name in explanation.names and size > 1.0]
 
 
-def _doubt(explanation: Explanation, waves: float) -> str:
+def is_pushed_but_not_turned(explanation: Explanation) -> bool:
+    """Whether the random forces are no moving water's: they shake heave alone, of a hull with a Munk moment.
+
+    Water that moves by v pushes it by -a1 v and turns it by -c_qw v, so that the densities of force and
+    moment are as a1^2 to c_qw^2. Not asked of waves, whose swing tells what they are.
+    """
+    fit = explanation.fit
+    names = fit.structure.names
+    if not fit.has_process_noise or fit.waves.any() or "c_qw" not in names:
+        return False
+    k = names.index("c_qw")
+    std = float(np.sqrt(np.diag(safe_inverse(fit.information))[k]))
+    munk, a1 = float(fit.parameters[k]), float(fit.parameters[names.index("a1")])
+    force, moment = fit.noise[2:4].tolist()
+    return abs(munk) > CERTAIN * std and moment < HARDLY_TURNED * force * (munk / a1) ** 2
+
+
+def _doubt(explanation: Explanation, left: Leftover, waves: float) -> str:
     """Why a set that leaves nothing may yet be none that acts; empty where nothing speaks against it."""
     if waves < FAINT_WAVES:
         return "waves are hardly likelier than physics that the catalogue does not hold."
+    if not left.is_by_speed and is_pushed_but_not_turned(explanation):
+        return "the random forces push the hull and do not turn it, as water would that has a Munk moment."
     rare = rare_in(explanation)
     reasons = (
         (rare if len(rare) > MOST_RARE else [], "seldom act at once: together"),
@@ -185,7 +207,7 @@ def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfi
         return f"Physics is at work that the catalogue does not hold.{forms}" + sea
     # Among random forces a free run is astray whatever is known, so that tells nothing.
     is_near = after.chi2 < WORSE or waves < inf or best.fit.has_process_noise
-    if left.is_nothing and is_near and (doubt := _doubt(best, waves)):
+    if left.is_nothing and is_near and (doubt := _doubt(best, left, waves)):
         return f"Nothing else is left, but {doubt}" + sea
     if left.is_smooth:
         kind = "it depends on the motion, so it is physics and no sea, but none that is known here"
