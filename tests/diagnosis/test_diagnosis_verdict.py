@@ -123,6 +123,21 @@ def test_offsets_that_cancel_are_doubted_by_name(
     assert not cancelling_in(replace(best, names=offsets - {"trim_moment"}))
 
 
+@pytest.mark.parametrize("turning", ["rudder_offset", "trim_moment"])
+@pytest.mark.parametrize(("left_over", "verdict"), [(0.01, "partly_explained"), (0.2, "explained")])
+def test_a_zero_error_of_pitch_that_a_current_and_a_moment_undo_is_doubted(
+    base: Explanation, turning: str, left_over: float, verdict: Verdict
+) -> None:
+    known = values_of(base)
+    moment = known["a3"] * 0.2
+    known |= {"pitch_zero": 0.2, "current": -0.2 * known["u0"] * (1.0 + left_over)}
+    known |= {"rudder_zero": moment / known["b2"], "c_q0": moment}
+    names = ["pitch_bias", "vertical_current", turning]
+    best = explanation_with(base, frozenset(names), known)
+    assert cancelling_in(best) == (names if verdict == "partly_explained" else [])
+    assert verdict_on(best, leftover(), misfit(5.0), misfit(1.0)) == verdict
+
+
 @pytest.mark.parametrize(("share", "is_doubted"), [(0.95, True), (-0.95, False), (0.5, False)])
 def test_a_current_that_cancels_a_weight_beside_a_drag_is_doubted(
     base: Explanation, share: float, is_doubted: bool

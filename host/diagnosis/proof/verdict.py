@@ -88,7 +88,9 @@ def rare_in(explanation: Explanation) -> list[str]:
 def cancelling_in(explanation: Explanation) -> list[str]:
     """A zero error of the plane, a weight and a moment, where the first all but undoes the others.
 
-    Or a drag, a weight and a current that all but undoes it: together they are a drag to one side only.
+    Or a zero error of pitch that a current all but undoes in how the vehicle rises, and a moment or the
+    plane's zero error in what rights it. Or a drag, a weight and a current that all but undoes it: together
+    they are a drag to one side only.
     """
     fit = explanation.fit
     p = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
@@ -98,11 +100,21 @@ def cancelling_in(explanation: Explanation) -> list[str]:
         if abs(weight + current) < (1.0 - NEARLY_CANCELLED) * max(abs(weight), abs(current)):
             return one_sided
     offsets = ["net_buoyancy", "rudder_offset", "trim_moment"]
-    if not explanation.names.issuperset(offsets):
-        return []
-    pairs = ((p["c_w0"], p["b1"] * p["rudder_zero"]), (p["c_q0"], p["b2"] * p["rudder_zero"]))
-    is_cancelled = all(abs(one + other) < (1.0 - CANCELLED) * abs(one) for one, other in pairs)
-    return offsets if is_cancelled else []
+    if explanation.names.issuperset(offsets):
+        force, moment = p["b1"] * p["rudder_zero"], p["b2"] * p["rudder_zero"]
+        if _cancel(p["c_w0"], force) and _cancel(p["c_q0"], moment):
+            return offsets
+    moments = {"rudder_offset": p["b2"] * p.get("rudder_zero", 0.0), "trim_moment": p.get("c_q0", 0.0)}
+    turning = [name for name in moments if name in explanation.names]
+    if turning and explanation.names.issuperset(["pitch_bias", "vertical_current"]):
+        climb, righting = p["u0"] * p["pitch_zero"], -p["a3"] * p["pitch_zero"]
+        if _cancel(climb, p["current"]) and _cancel(righting, sum(moments.values())):
+            return ["pitch_bias", "vertical_current", *turning]
+    return []
+
+
+def _cancel(one: float, other: float) -> bool:
+    return abs(one + other) < (1.0 - CANCELLED) * abs(one)
 
 
 def beyond_bounds_in(explanation: Explanation) -> list[str]:
