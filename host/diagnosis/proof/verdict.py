@@ -42,7 +42,9 @@ DRIFT = (
 )
 CORRECTED = " The model corrects the measured speed, which errs, by the surge equation (speed_correction)."
 CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
-NEARLY_CANCELLED = 0.85  # the same of one channel, beside a drag: by chance one in thirty
+NEARLY_CANCELLED = (
+    0.85  # the same by chance in one of thirty: of one channel beside a drag, of both in a thousand
+)
 NO_COUPLING = 2.0  # times the forward speed: masses allow for less than one (host.diagnosis.fits.charges)
 NO_MUNK = 6.0  # times what all of heave's damping would do at the plane
 LEAST_LEVER = 1.0  # 1/m, of the plane's moment over its force: less is a plane amidships
@@ -97,7 +99,7 @@ def cancelling_in(explanation: Explanation) -> list[str]:
     one_sided = ["heave_quadratic_drag", "net_buoyancy", "vertical_current"]
     if explanation.names.issuperset(one_sided):
         weight, current = p["c_w0"], -p["a1"] * p["current"]
-        if abs(weight + current) < (1.0 - NEARLY_CANCELLED) * max(abs(weight), abs(current)):
+        if _cancel(max(weight, current, key=abs), min(weight, current, key=abs), NEARLY_CANCELLED):
             return one_sided
     offsets = ["net_buoyancy", "rudder_offset", "trim_moment"]
     if explanation.names.issuperset(offsets):
@@ -108,13 +110,14 @@ def cancelling_in(explanation: Explanation) -> list[str]:
     turning = [name for name in moments if name in explanation.names]
     if turning and explanation.names.issuperset(["pitch_bias", "vertical_current"]):
         climb, righting = p["u0"] * p["pitch_zero"], -p["a3"] * p["pitch_zero"]
-        if _cancel(climb, p["current"]) and _cancel(righting, sum(moments.values())):
+        turned = sum(moments.values())
+        if _cancel(climb, p["current"], NEARLY_CANCELLED) and _cancel(righting, turned, NEARLY_CANCELLED):
             return ["pitch_bias", "vertical_current", *turning]
     return []
 
 
-def _cancel(one: float, other: float) -> bool:
-    return abs(one + other) < (1.0 - CANCELLED) * abs(one)
+def _cancel(one: float, other: float, share: float = CANCELLED) -> bool:
+    return abs(one + other) < (1.0 - share) * abs(one)
 
 
 def beyond_bounds_in(explanation: Explanation) -> list[str]:
