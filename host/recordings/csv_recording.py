@@ -73,12 +73,13 @@ def read_table(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> 
             f"{path}: column {named!r} for time holds no numbers (got {example!r}), as seconds are"
         )
     notes: tuple[str, ...] = ()
-    if (even := evenly_told(values["time"])) is not None and not _is_written_twice(values):
-        values["time"], step = even
-        notes = (f"its times are rounded to {step:.3g} s: the rows are taken as evenly spaced",)
+    if _repeats_times(values):
+        if (even := evenly_told(values["time"])) is None:
+            notes = ("many rows repeat the time of the row before, and are left out: is it rounded?",)
+        else:
+            values["time"], step = even
+            notes = (f"its times are rounded to {step:.3g} s: the rows are taken as evenly spaced",)
     keep = _advancing(values["time"], counts)
-    if counts["refused.time_not_advancing"] > _MANY * len(rows) and not _is_written_twice(values):
-        notes += ("many rows repeat the time of the row before, and are left out: is it rounded?",)
     values = {quantity: column[keep] for quantity, column in values.items()}
     if keep.sum() < 10:
         raise RecordingError(
@@ -106,12 +107,14 @@ def read_table(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> 
     )
 
 
-def _is_written_twice(values: dict[str, Array]) -> bool:
-    """Whether rows of one time mostly say the same: then they are one row."""
+def _repeats_times(values: dict[str, Array]) -> bool:
+    """Whether many rows repeat the time of the row before, and say something else: they are not one row."""
     again = np.flatnonzero(np.diff(values["time"]) == 0.0)
+    if again.size <= _MANY * values["time"].size:
+        return False
     channels = np.array([values[name] for name in CHANNELS])
     same = (channels[:, again] == channels[:, again + 1]) | np.isnan(channels[:, again])
-    return bool(np.mean(same.all(axis=0)) > 0.5)
+    return bool(np.mean(same.all(axis=0)) < 0.5)
 
 
 def _read_rows(path: Path) -> tuple[list[str], list[list[str]], str]:
