@@ -65,6 +65,10 @@ def test_a_speed_that_leaves_its_readings_is_charged_what_they_say_of_it() -> No
     astray = replace(corrected.fit, parameters=values)
     assert charge(astray) > 1e4
     assert fitter.bic(astray, CORRECTED) > fitter.bic(corrected.fit, CORRECTED) + 1e4
+    untold = replace(slowing(0.1), speed=np.full_like(slowing(0.1).speed, np.nan))
+    both = replace(astray, initial=2 * astray.initial)
+    two = [*fitter.inputs(CORRECTED), *Fitter([untold], known=corrected).inputs(CORRECTED)]
+    assert strayed(both, two, [speed_readings(each) for each in (slowing(0.1), untold)]) == charge(astray)
     alone = fitter.shrunk(corrected, "speed_loss")
     assert charge(alone.fit) == 0.0  # which corrects nothing
 

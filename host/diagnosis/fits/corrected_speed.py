@@ -20,6 +20,7 @@ from host.noise.noise_floor import white_noise
 from host.noise.speed import smoothed_speed
 from host.recordings.recording import Array, Recording
 
+NOISE_FREE = 1e-12  # m^2/s^2: below any sensor, so that readings without noise divide by no zero
 LOST = 1e12  # of a charge: as good as infinite, and of two the larger can be told
 
 
@@ -32,14 +33,16 @@ class SpeedReadings:
     allowed: float
 
 
-def speed_readings(recording: Recording) -> SpeedReadings:
-    """Of a recording with speed; noise-free ones take no correction."""
+def speed_readings(recording: Recording) -> SpeedReadings | None:
+    """None where the speed was not measured."""
+    if not recording.has_speed:
+        return None
     known = recording.speed[np.isfinite(recording.speed)]
-    smoothed, noise = smoothed_speed(recording.speed).speed, white_noise([known])
+    smoothed, noise = smoothed_speed(recording.speed).speed, max(float(white_noise([known])), NOISE_FREE)
     return SpeedReadings(smoothed, noise, noise + float(np.var(smoothed)))
 
 
-def strayed(fit: Fit, inputs: list[Inputs], readings: list[SpeedReadings]) -> float:
+def strayed(fit: Fit, inputs: list[Inputs], readings: list[SpeedReadings | None]) -> float:
     """The charge of a fit, in units of BIC; 0 where nothing corrects the speed, or where forces act."""
     structure = fit.structure
     if fit.has_process_noise or not structure.effect_names >= {"speed_loss", SPEED_CORRECTION.name}:
@@ -47,6 +50,8 @@ def strayed(fit: Fit, inputs: list[Inputs], readings: list[SpeedReadings]) -> fl
     speed = fit.parameters[structure.names.index("u0")]
     lost, charge = structure.states.index("speed_loss"), 0.0
     for x0, run, read in zip(fit.initial, inputs, readings, strict=True):
+        if read is None:
+            continue
         with np.errstate(over="ignore", invalid="ignore"):
             corrected = speed + free_run(fit.parameters, x0, run).states[lost]
             beyond = float(np.mean((corrected - read.smoothed) ** 2)) - read.allowed

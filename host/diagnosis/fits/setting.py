@@ -106,7 +106,7 @@ class Setting:
         return charged + strayed(fit, self.inputs(names), self._speed_readings)
 
     @cached_property
-    def _speed_readings(self) -> list[SpeedReadings]:
+    def _speed_readings(self) -> list[SpeedReadings | None]:
         return [speed_readings(recording) for recording in self.recordings]
 
     def inputs(self, names: Names, for_filter: bool = False) -> list[Inputs]:
