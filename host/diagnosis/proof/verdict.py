@@ -42,9 +42,7 @@ DRIFT = (
 )
 CORRECTED = " The model corrects the measured speed, which errs, by the surge equation (speed_correction)."
 CANCELLED = 0.95  # of an offset by another: by chance both channels do so once in a thousand
-NEARLY_CANCELLED = (
-    0.85  # the same by chance in one of thirty: of one channel beside a drag, of both in a thousand
-)
+NEARLY_CANCELLED = 0.85  # the same of one channel: by chance one in thirty
 NO_COUPLING = 2.0  # times the forward speed: masses allow for less than one (host.diagnosis.fits.charges)
 NO_MUNK = 6.0  # times what all of heave's damping would do at the plane
 LEAST_LEVER = 1.0  # 1/m, of the plane's moment over its force: less is a plane amidships
@@ -181,7 +179,10 @@ def _doubt(explanation: Explanation, left: Leftover, waves: float) -> str:
     if waves < FAINT_WAVES:
         return "waves are hardly likelier than physics that the catalogue does not hold."
     if not left.is_by_speed and is_pushed_but_not_turned(explanation):
-        return "the random forces push the hull and do not turn it, as water would that has a Munk moment."
+        return (
+            "the random forces push the hull and do not turn it, as moving water would with that Munk "
+            "moment: they may stand for physics that the catalogue does not hold."
+        )
     rare = rare_in(explanation)
     reasons = (
         (rare if len(rare) > MOST_RARE else [], "seldom act at once: together"),

@@ -45,8 +45,8 @@ def with_plane_told(recordings: list[Recording]) -> list[Recording]:
         )
     elif any(_is_seldom_read(recording) for recording in recordings):
         note = (
-            "the plane was read in few of the rows: when it moved between its readings is not known, and "
-            "what its steps make of that is left as if it were physics"
+            "the plane was read in some of the rows only: when it moved between its readings is not known, "
+            "and what its steps make of that is left as if it were physics"
         )
     else:
         note = None
