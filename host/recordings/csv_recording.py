@@ -73,12 +73,12 @@ def read_table(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> 
             f"{path}: column {named!r} for time holds no numbers (got {example!r}), as seconds are"
         )
     notes: tuple[str, ...] = ()
-    if _repeats_times(values):
-        if (even := evenly_told(values["time"])) is None:
-            notes = ("many rows repeat the time of the row before, and are left out: is it rounded?",)
-        else:
-            values["time"], step = even
-            notes = (f"its times are rounded to {step:.3g} s: the rows are taken as evenly spaced",)
+    repeats, are_rows_twice = _repeated_times(values)
+    if not are_rows_twice and (even := evenly_told(values["time"])) is not None:
+        values["time"], step = even
+        notes = (f"its times are rounded to {step:.3g} s: the rows are taken as evenly spaced",)
+    elif repeats > _MANY and not are_rows_twice:
+        notes = ("many rows repeat the time of the row before, and are left out: is it rounded?",)
     keep = _advancing(values["time"], counts)
     values = {quantity: column[keep] for quantity, column in values.items()}
     if keep.sum() < 10:
@@ -107,14 +107,12 @@ def read_table(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> 
     )
 
 
-def _repeats_times(values: dict[str, Array]) -> bool:
-    """Whether many rows repeat the time of the row before, and say something else: they are not one row."""
+def _repeated_times(values: dict[str, Array]) -> tuple[float, bool]:
+    """Share of the rows that repeat the time of the row before, and whether most of them say the same."""
     again = np.flatnonzero(np.diff(values["time"]) == 0.0)
-    if again.size <= _MANY * values["time"].size:
-        return False
     channels = np.array([values[name] for name in CHANNELS])
     same = (channels[:, again] == channels[:, again + 1]) | np.isnan(channels[:, again])
-    return bool(np.mean(same.all(axis=0)) < 0.5)
+    return again.size / values["time"].size, bool(again.size and np.mean(same.all(axis=0)) >= 0.5)
 
 
 def _read_rows(path: Path) -> tuple[list[str], list[list[str]], str]:

@@ -77,16 +77,25 @@ def test_time_running_backwards_and_repeated_is_dropped_and_counted(tmp_path: Pa
     assert recording.counts["refused.time_missing"] == 1
 
 
-@pytest.mark.parametrize("decimals", [0, 1])
-def test_rows_of_rounded_times_are_spread_evenly(tmp_path: Path, decimals: int) -> None:
-    step = 0.1 if decimals == 0 else 0.02
+@pytest.mark.parametrize(("decimals", "step"), [(0, 0.1), (1, 0.02), (1, 0.125), (2, 1.0 / 12.0)])
+def test_rows_of_rounded_times_are_spread_evenly(tmp_path: Path, decimals: int, step: float) -> None:
     lines = [f"{round(7.3 + step * k, decimals)},{10 + 0.01 * k:.4f},{0.001 * k:.4f},0.1" for k in range(200)]
     (recording,) = read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
-    assert recording.time == pytest.approx(step * np.arange(200), abs=0.1 * step * 10**-decimals / step)
+    assert recording.time == pytest.approx(step * np.arange(200), abs=0.1 * 10**-decimals)
     assert recording.step == pytest.approx(step, rel=0.01)
     assert recording.notes == (
         f"its times are rounded to {10**-decimals:.3g} s: the rows are taken as evenly spaced",
     )
+
+
+@pytest.mark.parametrize("jitter", [0.0, 1e-3, 0.03])
+def test_exact_times_and_those_of_an_uneven_clock_stay_as_they_are(tmp_path: Path, jitter: float) -> None:
+    off = np.random.default_rng(1).uniform(0.0, jitter, 200)
+    told = [f"{0.1 * k + off[k]:.3f}" for k in range(200)]
+    lines = [f"{at},{10 + 0.01 * k:.4f},{0.001 * k:.4f},0.1" for k, at in enumerate(told)]
+    (recording,) = read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
+    assert recording.time == pytest.approx(np.array(told, dtype=float) - float(told[0]), abs=1e-9)
+    assert recording.notes == ()
 
 
 def test_times_that_repeat_without_a_pace_or_rows_written_twice_are_dropped(tmp_path: Path) -> None:

@@ -31,6 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="every vehicle is like one that was published, with the whole of its physics; not with --usual",
     )
+    parser.add_argument(
+        "--as-logged",
+        action="store_true",
+        help="as loggers keep recordings: sensors and planes read in few rows, rounded times, rows lost",
+    )
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes at once (default 2)")
     parser.add_argument("--quiet", action="store_true", help="no progress")
 
@@ -67,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
         if digest is None:
             seed = int.from_bytes(os.urandom(6)) if args.seed is None else args.seed
             with stage("drawing vehicles", args.count) as step:
-                digest = write_trial(folder, seed, args.count, args.jobs, step, fleet)
+                digest = write_trial(folder, seed, args.count, args.jobs, step, fleet, args.as_logged)
         print(f"answers sealed: SHA-256 {digest}  {folder / SEALED}", flush=True)
         paths = recordings(folder)[chosen]
         if not paths:

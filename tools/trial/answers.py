@@ -16,13 +16,17 @@ class BrokenSeal(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Floor:
-    """Noise-free truth at the recorded instants, and the noise that was put on it."""
+    """Noise-free truth at the instruments' instants, and the noise that was put on it.
+
+    rows  those that the logger kept; None where all were kept as they were
+    """
 
     pitch_noise_rad: float
     depth_noise_m: float
     step_s: float
     pitch_rad: list[float]
     depth_m: list[float]
+    rows: list[int] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,12 +66,19 @@ def seal(folder: Path, seed: int, answers: list[Answer]) -> str:
 
     The seed goes under the seal too: whoever knows it can draw the answers.
     """
-    text = json.dumps({"schema": 1, "seed": seed, "answers": [asdict(answer) for answer in answers]})
+    text = json.dumps({"schema": 1, "seed": seed, "answers": [_told(answer) for answer in answers]})
     packed = gzip.compress(text.encode(), mtime=0)
     digest = hashlib.sha256(packed).hexdigest()
     (folder / SEALED).write_bytes(packed)
     (folder / SEAL).write_text(f"{digest}  {SEALED}\n", encoding="utf-8")
     return digest
+
+
+def _told(answer: Answer) -> dict[str, object]:
+    entry = asdict(answer)
+    if entry["floor"]["rows"] is None:
+        del entry["floor"]["rows"]  # trials that were sealed before there were loggers keep their hash
+    return entry
 
 
 def published(folder: Path) -> str | None:

@@ -14,6 +14,7 @@ from tools.trial.deck import Card
 from tools.trial.fleet import Fleet, hideable
 from tools.trial.flight import Flight
 from tools.trial.hidden import STRANGERS, Hidden, Setting, draw_hidden, switched, with_strength
+from tools.trial.logger import Logger
 from tools.trial.outing import LONGEST_STEP, Outing, draw_outing, with_amplitude
 from tools.trial.published import NATIVE, SLOW_STEP, draw_published, draw_servo, draw_steady
 from tools.trial.usual import draw_usual
@@ -45,10 +46,12 @@ class Drawn:
     flight: Flight
 
 
-def draw(seed: int, number: int, card: Card, fleet: Fleet = "linear") -> Drawn:
+def draw(seed: int, number: int, card: Card, fleet: Fleet = "linear", is_logged: bool = False) -> Drawn:
     """Recording `number` of a trial: vehicles and outings are drawn until all on the card can be seen.
 
     It is seen beside what the vehicles of the fleet have by themselves.
+
+    is_logged  a logger comes between the instruments and the file
     """
     for attempt in range(MOST_ATTEMPTS):
         rng = np.random.default_rng([seed, 4, number, attempt])
@@ -56,7 +59,8 @@ def draw(seed: int, number: int, card: Card, fleet: Fleet = "linear") -> Drawn:
             family = tuple(STRANGERS) if card.case == "outside" else hideable(fleet)
             names = rng.choice(family, len(card.names), replace=False).tolist()
             card = Card(card.case, tuple(names))
-        drawn = _attempt(rng, number, card, fleet)
+        loggers = np.random.default_rng([seed, 5, number, attempt]) if is_logged else None
+        drawn = _attempt(rng, number, card, fleet, loggers)
         if drawn is not None:
             return drawn
     raise CannotDraw(
@@ -64,10 +68,14 @@ def draw(seed: int, number: int, card: Card, fleet: Fleet = "linear") -> Drawn:
     )
 
 
-def _attempt(rng: np.random.Generator, number: int, card: Card, fleet: Fleet) -> Drawn | None:
+def _attempt(
+    rng: np.random.Generator, number: int, card: Card, fleet: Fleet, loggers: np.random.Generator | None
+) -> Drawn | None:
     name, vehicle = draw_published(rng) if fleet == "published" else ("", draw_vehicle(rng))
     longest = SLOW_STEP if fleet == "published" else LONGEST_STEP
     outing = draw_outing(rng, vehicle, "surface_waves" in card.names, longest)
+    if loggers is not None:
+        outing = replace(outing, logger=Logger.drawn(loggers, outing.rate_hz))
     seed = int(rng.integers(2**31))
     scenario = outing.scenario
     setting = Setting(
@@ -81,7 +89,7 @@ def _attempt(rng: np.random.Generator, number: int, card: Card, fleet: Fleet) ->
     setting = replace(
         setting, command=float(np.abs(plain.command).max()), pitch=float(np.abs(plain.pitch).max())
     )
-    noise = yardstick(outing.scenario, seed, plain)
+    noise = yardstick(outing.scenario, seed, plain, outing.logger)
     if not is_ordinary(plain) or setting.command < 0.01:
         return None
     hidden: tuple[Hidden, ...] = ()
@@ -211,6 +219,10 @@ def _written(
     ):
         if not is_there:
             del table[column]
+    rows = np.round(table["time_s"] * outing.rate_hz).astype(int)
+    logger = outing.logger
+    if logger is not None:
+        rows, table = rows[logger.rows(len(rows))], logger.kept(table)
     sea = Plant(replace(outing.scenario, effects=switched((*hidden, *usual), setting)), seed).sea
     phase = (sin(sea.internal_phase), cos(sea.internal_phase))
     excitation = outing.scenario.excitation
@@ -237,6 +249,7 @@ def _written(
             "loss": outing.scenario.sensors.depth.loss,
             "depth_quantum_m": outing.scenario.sensors.depth.quantum,
             "pitch_quantum_rad": outing.scenario.sensors.pitch.quantum,
+            **({} if logger is None else logger.told()),
         },
         floor=Floor(
             pitch_noise_rad=noise.pitch_noise,
@@ -244,6 +257,7 @@ def _written(
             step_s=1.0 / outing.rate_hz,
             pitch_rad=[round(value, 7) for value in voyage.pitch.tolist()],
             depth_m=[round(value, 6) for value in voyage.depth.tolist()],
+            rows=None if logger is None else rows.tolist(),
         ),
     )
     flight = Flight(

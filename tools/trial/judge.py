@@ -159,27 +159,29 @@ def _over_floor(
 ) -> float | None:
     """Both channels' held-out mean squares over those of the noise in the same spans, then the root.
 
-    Where diagnosis.json does not say which spans it held out, the noise of the whole recording stands in.
+    Where diagnosis.json does not say which spans it held out, the noise of the whole recording stands in;
+    where a logger filled rows between readings, which is no noise, the instruments' own deviations do.
     """
     if diagnosis is None:
         return None
     heldout = diagnosis[side]["heldout"]
     floor = answer.floor
     times = np.asarray(recorded["time_s"])
-    rows = np.round(times / floor.step_s).astype(int)
+    rows = np.round(times / floor.step_s).astype(int) if floor.rows is None else np.array(floor.rows)
     inside = np.ones(len(times), dtype=bool)
     spans = heldout.get("spans_s")
     if spans:
         inside = np.any([(times >= begin) & (times <= end) for begin, end in spans], axis=0)
     shares = []
-    for truth, column, key in (
-        (floor.pitch_rad, "pitch_rad", "pitch_rmse_rad"),
-        (floor.depth_m, "depth_m", "depth_rmse_m"),
+    for truth, column, key, noise in (
+        (floor.pitch_rad, "pitch_rad", "pitch_rmse_rad", floor.pitch_noise_rad),
+        (floor.depth_m, "depth_m", "depth_rmse_m", floor.depth_noise_m),
     ):
         off = np.asarray(recorded[column])[inside] - np.asarray(truth)[rows[inside]]
         if heldout.get(key) is None or not np.isfinite(off).any():
             return None
-        shares.append(heldout[key] ** 2 / float(np.nanmean(off**2)))
+        least = float(np.nanmean(off**2)) if floor.rows is None else noise**2
+        shares.append(heldout[key] ** 2 / least)
     return sqrt(sum(shares) / 2)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from tools.sitl.excitation import Excitation
 from tools.sitl.scenario import Scenario, Start
 from tools.sitl.sensors import Channel, Sensors
+from tools.trial.logger import Logger
 from tools.trial.vehicle import Vehicle, log_uniform
 
 RATES_HZ = (5.0, 8.0, 10.0, 10.0, 12.5, 20.0)
@@ -18,11 +19,12 @@ LEAST_STEPPED = 0.08  # s: a shorter interval between commands has as many steps
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outing:
-    """One run to be recorded and which optional columns its recording has."""
+    """One run to be recorded, which optional columns its recording has, and what the logger spoils of it."""
 
     scenario: Scenario
     has_speed: bool
     has_pitch_rate: bool
+    logger: Logger | None = None
 
     @property
     def rate_hz(self) -> float:

@@ -10,6 +10,7 @@ from tools.sitl.recording import measure
 from tools.sitl.scenario import Scenario
 from tools.trial.hidden import Hidden, Setting, with_strength
 from tools.trial.linear import MORE, NAMES, STATE, free_run
+from tools.trial.logger import Logger
 from tools.trial.outing import Outing
 from tools.trial.refit import foretold, remaining
 from tools.trial.voyage import Voyage, sail
@@ -66,9 +67,11 @@ def _heard(hearing: Array | None, misfit: Array) -> Array:
     return np.asarray(np.fft.irfft(np.fft.rfft(misfit, rows) * hearing, rows))
 
 
-def yardstick(scenario: Scenario, seed: int, voyage: Voyage) -> Yardstick:
-    """For the instruments of a scenario."""
+def yardstick(scenario: Scenario, seed: int, voyage: Voyage, logger: Logger | None = None) -> Yardstick:
+    """For the instruments of a scenario, and what their logger keeps."""
     table = measure(scenario, seed, voyage.table)
+    if logger is not None:
+        table = logger.readings(table)
     rows = np.round(table["time_s"] * scenario.sensors.depth.rate_hz).astype(int)
     arrived = np.zeros((2, len(voyage.pitch)), dtype=bool)
     arrived[0, rows] = np.isfinite(table["pitch_rad"])

@@ -16,7 +16,13 @@ RECORDINGS = "recordings"
 
 
 def write_trial(
-    folder: Path, seed: int, count: int, jobs: int, on_drawn: Callable[[], None], fleet: Fleet = "linear"
+    folder: Path,
+    seed: int,
+    count: int,
+    jobs: int,
+    on_drawn: Callable[[], None],
+    fleet: Fleet = "linear",
+    is_logged: bool = False,
 ) -> str:
     """Writes `count` recordings of a seed and the sealed answers; gives the SHA-256 of the answers."""
     (folder / RECORDINGS).mkdir(parents=True, exist_ok=True)
@@ -26,7 +32,7 @@ def write_trial(
     answers = []
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         drawing = [
-            pool.submit(_write_one, folder, seed, number, card, fleet)
+            pool.submit(_write_one, folder, seed, number, card, fleet, is_logged)
             for number, card in enumerate(deal(seed, count, fleet), start=1)
         ]
         for drawn in as_completed(drawing):
@@ -40,7 +46,7 @@ def recordings(folder: Path) -> list[Path]:
     return sorted((folder / RECORDINGS).glob("*.csv"))
 
 
-def _write_one(folder: Path, seed: int, number: int, card: Card, fleet: Fleet) -> Answer:
-    drawn = draw(seed, number, card, fleet)
+def _write_one(folder: Path, seed: int, number: int, card: Card, fleet: Fleet, is_logged: bool) -> Answer:
+    drawn = draw(seed, number, card, fleet, is_logged)
     write_csv(folder / RECORDINGS / f"{recording_name(number)}.csv", drawn.table)
     return drawn.answer
