@@ -16,6 +16,7 @@ from host.diagnosis.fits.leftover import Leftover
 from host.diagnosis.fits.sea_fits import WAVES, again_in_waves, again_under_forces, with_regular_waves
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.plane_choice import Way, is_likelier, likelier_first, ways
+from host.diagnosis.plane_moments import with_plane_moments
 from host.diagnosis.proof.deviations import deviations
 from host.diagnosis.proof.locate import Location, locate
 from host.diagnosis.proof.minute import LEAST_ANGLE, minute_in
@@ -122,6 +123,7 @@ def diagnose(
     check_signs(seen)
     seen = noted(seen, units_note(seen))
     seen = seen if may_be_quiet else as_sensed(seen)
+    seen = with_plane_moments(seen, on_progress)
     first, *others = likelier_first(ways(seen), on_progress, jobs)
     return _diagnosed(first, others, on_progress, jobs, like, [])
 

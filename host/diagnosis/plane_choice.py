@@ -4,8 +4,6 @@ from collections.abc import Callable
 from math import inf
 from typing import NamedTuple
 
-import numpy as np
-
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.disturbances.plain_waves import plain_waves, whole_in_waves
 from host.diagnosis.fits.explanation import Explanation, Names
@@ -17,11 +15,12 @@ from host.diagnosis.recordings.spans import divide, excerpt
 from host.diagnosis.search.outset import at_the_outset, leads_on, pushed_by_forces, says_all
 from host.diagnosis.search.search import Search
 from host.diagnosis.search.whole_vehicle import is_real, with_all_ordinary
-from host.recordings.plane_between_rows import with_moving_plane
+from host.recordings.plane_between_rows import ways_between
 from host.recordings.recording import Recording
 
 FAR_LIKELIER = 1.0  # of BIC a sample: what no search without waves makes up for
 CONTENDERS = 10  # sets that are tried with the plane the other way
+MOST_WAYS = 2  # that are searched: the base equations tell a third from these
 LEADING = 3  # single effects, of which the likeliest often is a part of the truth
 
 
@@ -47,17 +46,15 @@ class Way(NamedTuple):
 
 
 def ways(recordings: list[Recording]) -> list[Way]:
-    """The recordings with a plane that held its angles and with one that moved, the likelier first.
+    """The recordings with a plane that held its angles and with one that moved, the likeliest two.
 
     As the base equations see them: what is left out may favour the other.
     """
-    moving = [with_moving_plane(recording) for recording in recordings]
-    is_same = all(np.array_equal(a.rudder, b.rudder) for a, b in zip(recordings, moving, strict=True))
-    tried = [recordings] if is_same else [recordings, moving]
+    tried = ways_between(recordings)
     teaching = [divide(each).teaching for each in tried]
     parts = [excerpt(runs, like=teaching[0]) for runs in teaching]
     fitted = [Way(each, Fitter(part)) for each, part in zip(tried, parts, strict=True)]
-    return sorted(fitted, key=lambda way: way.fitter.base.bic)
+    return sorted(fitted, key=lambda way: way.fitter.base.bic)[:MOST_WAYS]
 
 
 def likelier_first(found: list[Way], on_progress: Callable[[str], None], jobs: int) -> list[Way]:

@@ -266,6 +266,8 @@ def _blank(flown: Manoeuvre, like: Recording) -> Recording:
         pitch_rate=nan,
         speed=np.full(rows, mean_speed([like])) if like.has_speed else nan,
         rudder=flown.rudder,
+        plane=None,
+        plane_doubt=None,
         step=flown.step,
     )
 

@@ -16,12 +16,14 @@ from host.compiled.over_rows import KEPT, over_rows
 from host.dynamics.equations import BASE, START, Chain, Structure
 from host.noise.drift import NOT_WHITENED, Whitenings
 from host.noise.speed import smoothed_speed
+from host.noise.unseen_plane import UnseenPlane
 from host.recordings.recording import Array, Recording
 
 NX0 = len(START)
 MOST_SUBSTEPS = 8  # slow records show no modes faster than their sampling: finer steps would resolve nothing
 LONGEST_SUBSTEP = 0.05  # s; for a 10 rad/s mode the error of one sub-step is below 3e-4 of its change
 LONGEST_OF_ALL = 0.5  # s; a quarter of the shortest period of a wave
+FIRST_LAG = 6  # of the rows of `drive`: what stands before the earlier commands
 LONGEST_DELAY = 1.0  # s; how far back commands are looked up
 
 
@@ -36,6 +38,7 @@ class Inputs:
     present   (2, N) 1 where measured, else 0
     steps     (2,) of the rounding of pitch and depth where it rules, else 0
     whitening  of pitch and of depth, where more than white noise is in them
+    unseen     the same of both, where the plane stepped unseen
     shared     larger equations that are evaluated in place of the structure's own, if any; what these lack
                acts nowhere where its parameters are 0, and moves no state of its own
     """
@@ -47,11 +50,18 @@ class Inputs:
     substeps: int
     steps: Array = field(default_factory=lambda: np.zeros(2))
     whitening: Whitenings = NOT_WHITENED
+    unseen: UnseenPlane | None = None
     shared: Structure | None = None
 
     def of(self, structure: Structure, shared: Structure | None = None) -> "Inputs":
         """What drives other equations over the same recording, which look back as far."""
         return replace(self, structure=structure, shared=shared)
+
+    def with_rudder(self, rudder: Array) -> "Inputs":
+        """The same with other commands, rad (N,)."""
+        rest = self.drive[1:FIRST_LAG]
+        lags = self.drive.shape[0] - FIRST_LAG
+        return replace(self, drive=np.vstack([rudder, rest, *_earlier(rudder, lags)]))
 
     @property
     def evaluated(self) -> Structure:
@@ -92,23 +102,33 @@ def inputs_of(
     surge = np.append(np.diff(speed) / intervals[:-1], 0.0)
     speed = np.append((speed[:-1] + speed[1:]) / 2.0, speed[-1:])  # from row to row it changes evenly
     lags = int(np.ceil(LONGEST_DELAY / recording.step)) + 1 if structure.needs_lags else 0
-    earlier = [
-        np.concatenate([np.full(min(lag, intervals.size), recording.rudder[0]), recording.rudder])[
-            : intervals.size
-        ]
-        for lag in range(1, lags + 1)
-    ]
     measured = np.vstack([recording.pitch, recording.depth])
     present = np.isfinite(measured)
     return Inputs(
         structure=structure,
-        drive=np.vstack([recording.rudder, speed, known, intervals, recording.time, surge, *earlier]),
+        drive=np.vstack(
+            [
+                recording.rudder,
+                speed,
+                known,
+                intervals,
+                recording.time,
+                surge,
+                *_earlier(recording.rudder, lags),
+            ]
+        ),
         measured=np.where(present, measured, 0.0),
         present=present.astype(float),
         substeps=int(np.ceil(recording.step / max(longest_substep, recording.step / MOST_SUBSTEPS) - 1e-6)),
         steps=steps,
         whitening=whitening,
     )
+
+
+def _earlier(rudder: Array, lags: int) -> list[Array]:
+    """Commands one row ago, two, and so on; the first stood before the recording."""
+    count = rudder.size
+    return [np.append(np.full(min(lag, count), rudder[0]), rudder)[:count] for lag in range(1, lags + 1)]
 
 
 def longest_substep(parameters: Array, step: float) -> float:

@@ -18,7 +18,7 @@ from host.likelihood.maximum_likelihood import fit_maximum_likelihood
 from host.noise.whiteness import is_white
 from host.recordings.consistency import check_signs, units_note
 from host.recordings.outliers import without_outliers
-from host.recordings.plane_between_rows import with_moving_plane
+from host.recordings.plane_between_rows import ways_between
 from host.recordings.recording import Array, Recording
 from host.vehicle import Vehicle
 
@@ -119,14 +119,15 @@ def identify(
 
 def _between_rows(recordings: list[Recording], on_progress: Progress) -> list[list[Recording]]:
     """The recordings with the plane taken to hold its angles, and to move on evenly: the likelier first."""
-    moving = [with_moving_plane(recording) for recording in recordings]
-    if all(np.array_equal(a.rudder, b.rudder) for a, b in zip(recordings, moving, strict=True)):
-        return [recordings]
+    held, *others = ways_between(recordings)
+    if not others:
+        return [held]
     on_progress("the plane between rows")
-    held_bic, moving_bic = (
-        fit_maximum_likelihood(each, noise_model="output_error").bic for each in (recordings, moving)
+    held_bic, *bics = (
+        fit_maximum_likelihood(each, noise_model="output_error").bic for each in (held, *others)
     )
-    return [moving, recordings] if moving_bic < held_bic - CLEARLY else [recordings, moving]
+    moving = others[int(np.argmin(bics))]
+    return [moving, held] if min(bics) < held_bic - CLEARLY else [held, moving]
 
 
 def _learn(recordings: list[Recording], vehicle: Vehicle, method: Method, on_progress: Progress) -> Learnt:

@@ -144,24 +144,23 @@ def _free_runs(point: Point, inputs: list[Inputs]) -> list[Run]:
 def _errors(runs: list[Run], inputs: list[Inputs]) -> list[Array]:
     with np.errstate(invalid="ignore"):  # a trial that runs away is infinite, and refused for it
         errors = [one.present * (one.measured - run.outputs) for run, one in zip(runs, inputs, strict=True)]
-    return [_less_drift(error, one) for error, one in zip(errors, inputs, strict=True)]
+    return [_whitened(error, one) for error, one in zip(errors, inputs, strict=True)]
 
 
-def _less_drift(values: Array, inputs: Inputs) -> Array:
-    """Residuals (2, N) or sensitivities (2, c, N) with what drifts in either channel whitened."""
+def _whitened(values: Array, inputs: Inputs) -> Array:
+    """Residuals (2, N) or sensitivities (2, c, N) with what drifts, or came of a plane unseen, whitened."""
     for i, whitening in enumerate(inputs.whitening):
         if whitening is not None:
             channel = np.atleast_2d(values[i])
             with np.errstate(invalid="ignore", over="ignore"):
                 values[i] = inputs.present[i] * whitening.whitened(channel).reshape(values[i].shape)
-    return values
+    return values if inputs.unseen is None else inputs.unseen.whitened(values)
 
 
 def _innovations(point: Point, runs: list[Run], inputs: list[Inputs]) -> list[tuple[Array, Array]]:
     each = zip(_errors(runs, inputs), runs, point.initial, inputs, strict=True)
     return [
-        (error, _less_drift(sensitivities(point.parameters, x0, one, run), one))
-        for error, run, x0, one in each
+        (error, _whitened(sensitivities(point.parameters, x0, one, run), one)) for error, run, x0, one in each
     ]
 
 

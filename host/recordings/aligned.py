@@ -14,12 +14,14 @@ from bridge.measurement import Measurement, Quantity
 from firmware_model.sample import Sample
 from host.live.align import AlignConfig, Aligner
 from host.recordings.outliers import CHANNELS, outliers, told
+from host.recordings.plane_readings import PlaneReadings
 from host.recordings.recording import NEEDED, Array, Recording, split_at_gaps
 
 ONE_CHANNEL = 0.5  # of the rows that tell depth: at most so many tell pitch, too, where each has its own
 FEWEST = 10  # messages of either
 SAME_STEP = 0.1  # of the vehicle's step, by which a table's may differ
 SHORTEST = 1e-3  # s, of a step
+BESIDE = 2_000_000  # us: a command sent so long before or after a segment still tells of it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +64,7 @@ def aligned(messages: Messages, config: AlignConfig, needs: tuple[str, ...] = NE
     pieces = []
     for segment in segments.values():
         if segment.samples:
-            whole = _recording(messages, segment, config.step, counts)
+            whole = _recording(messages, segment, config, counts)
             whole = replace(whole, rudder=_bridged(whole.rudder, round(longest / config.step)))
             pieces += split_at_gaps(whole, longest, needs)
     return pieces
@@ -129,7 +131,7 @@ def _measurements(table: Recording) -> Iterable[Measurement]:
                 yield Measurement(quantity=quantity, value=values[row], t_us=t_us, source="row")
 
 
-def _recording(messages: Messages, segment: _Segment, step: float, counts: Counter[str]) -> Recording:
+def _recording(messages: Messages, segment: _Segment, config: AlignConfig, counts: Counter[str]) -> Recording:
     samples = segment.samples
     first, last = samples[0].t_us, samples[-1].t_us
     begins = 0 if messages.starts_at_zero else first
@@ -143,12 +145,29 @@ def _recording(messages: Messages, segment: _Segment, step: float, counts: Count
         rudder=np.array([sample.rudder for sample in samples]),
         speed=np.array([sample.speed for sample in samples]),
         pitch_rate=np.array([sample.pitch_rate for sample in samples]),
-        step=step,
+        step=config.step,
         has_angle=messages.has_angle,
+        plane=None if config.rudder_on_change else _plane(messages, segment, config.step, begins),
         counts=counts,
         notes=messages.notes,
         alarms=tuple(1e-6 * (t_us - begins) for t_us in marked),
     )
+
+
+def _plane(messages: Messages, segment: _Segment, step: float, begins: int) -> PlaneReadings | None:
+    """The readings of a plane that was sent more seldom than there are samples; None of any other."""
+    first, last = segment.samples[0].t_us - BESIDE, segment.samples[-1].t_us + BESIDE
+    sent = [
+        (1e-6 * (one.t_us - begins), one.value)
+        for one in messages.measurements
+        if one.quantity is Quantity.RUDDER and one.boot == segment.boot and first <= one.t_us <= last
+    ]
+    time, angle = np.array(sent).reshape(-1, 2).T
+    later = np.diff(np.maximum.accumulate(time), prepend=-np.inf) > 0.0
+    if later.sum() < FEWEST:
+        return None
+    plane = PlaneReadings(time[later], angle[later], step)
+    return plane if plane.is_slow else None
 
 
 def _bridged(rudder: Array, longest: int) -> Array:

@@ -10,6 +10,7 @@ from bridge.measurement import Quantity
 from bridge.measurement_gate import LARGEST
 from host.errors import RecordingError
 from host.recordings.csv_map import UNITS, CsvColumn, CsvMap
+from host.recordings.plane_in_table import plane_readings
 from host.recordings.recording import NEEDED, Array, Recording, file_sha256, split_at_gaps
 from host.recordings.resampled import readings_alone
 from host.recordings.rounded_time import evenly_told
@@ -91,10 +92,11 @@ def read_table(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> 
             f"{path}: rows are {step:.3g} s apart, too far to see any motion; a time in milliseconds needs "
             'unit = "ms" under [csv.time]'
         )
+    time = values["time"] - values["time"][0]
     return Recording(
         name=path.name,
         sha256=file_sha256(path),
-        time=values["time"] - values["time"][0],
+        time=time,
         depth=values["depth"],
         pitch=values["pitch"],
         rudder=values["rudder"],
@@ -102,6 +104,7 @@ def read_table(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> 
         pitch_rate=values["pitch_rate"],
         step=step,
         has_angle=columns.rudder.unit != "raw" or columns.rudder.scale != 1.0,
+        plane=plane_readings(time, values["rudder"], step),
         counts=counts,
         notes=notes,
     )

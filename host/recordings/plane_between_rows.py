@@ -6,25 +6,72 @@ angle of a plane that moves on evenly from row k to k + 1 is
 
     delta_k + (t_(k+1) - t_k) s_k / 2,  |s_k| = min(|d_k|, 2 max(|d_(k-1)|, |d_(k+1)|)),  d_k the slope there
 
-A plane that rests before and after has stepped: a step stays a step.
+A plane that rests before and after has stepped: a step stays a step. Where the plane was read in few of the
+rows its readings count in their place, and a step is about halfway between two
+(host.recordings.plane_readings).
 """
 
 from dataclasses import replace
 
 import numpy as np
 
-from host.recordings.recording import Recording
+from host.recordings.plane_readings import PlaneReadings
+from host.recordings.recording import Array, Recording
 
 NOTE = "the plane is taken to move evenly from row to row: the recording follows that better than angles held"
+
+NOTE_BETWEEN = "the plane was read in few of the rows: it is taken to move on from reading to reading"
 
 
 def with_moving_plane(recording: Recording) -> Recording:
     """The recording with the mean angles of a plane that moves on evenly."""
+    if recording.has_moving_plane:
+        return recording
+    if recording.plane is not None and recording.plane.is_slow:
+        return between_readings(recording, recording.plane)
     slopes = np.diff(recording.rudder) / np.diff(recording.time)
-    if recording.has_moving_plane or slopes.size < 3:
+    if slopes.size < 3:
         return recording
     beside = np.maximum(np.abs(slopes[:-2]), np.abs(slopes[2:]))
     slope = np.zeros_like(recording.rudder)
     slope[1:-2] = np.clip(slopes[1:-1], -2.0 * beside, 2.0 * beside)
     rudder = recording.rudder + 0.5 * recording.intervals * slope
     return replace(recording, rudder=rudder, has_moving_plane=True, notes=(*recording.notes, NOTE))
+
+
+def between_readings(
+    recording: Recording,
+    plane: PlaneReadings,
+    moments: Array | None = None,
+    holds_between: bool = False,
+    note: str = NOTE_BETWEEN,
+) -> Recording:
+    """The recording with the mean angles of a plane that stepped at these moments, and else moved on evenly.
+
+    moments, holds_between  as of PlaneReadings.means
+    """
+    ends = recording.time + recording.intervals
+    rudder = plane.means(recording.time, ends, moments, holds_between)
+    return replace(recording, rudder=rudder, has_moving_plane=True, notes=(*recording.notes, note))
+
+
+def ways_between(recordings: list[Recording]) -> list[list[Recording]]:
+    """The recordings with a plane that held, and with one that moved on from row to row.
+
+    Where it was read in few of the rows, with one that moved on from reading to reading, all the time or from
+    row to row.
+    """
+    others = [[with_moving_plane(recording) for recording in recordings]]
+    if any(one.plane is not None and one.plane.is_slow and one.plane.pace > 0.0 for one in recordings):
+        others.append([_in_rows(recording) for recording in recordings])
+    return [recordings, *(other for other in others if not _are_alike(recordings, other))]
+
+
+def _in_rows(recording: Recording) -> Recording:
+    if recording.has_moving_plane or recording.plane is None or not recording.plane.is_slow:
+        return recording
+    return between_readings(recording, recording.plane, holds_between=True)
+
+
+def _are_alike(recordings: list[Recording], others: list[Recording]) -> bool:
+    return all(np.array_equal(a.rudder, b.rudder) for a, b in zip(recordings, others, strict=True))

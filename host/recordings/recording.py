@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from host.recordings.plane_readings import PlaneReadings
+
 Array = NDArray[np.float64]
 NEEDED = ("depth", "pitch", "rudder")
 LONGEST_BETWEEN_SPEEDS = 2.5  # s, between two readings: a manoeuvre slows the vehicle within a few
@@ -27,6 +29,9 @@ class Recording:
     step        s, nominal interval
     has_angle   whether rudder is an angle in rad; False for another actuator in a unit of its own
     has_moving_plane  whether rudder holds the means of a plane that moved on to the next row's angle
+    plane       its readings, where these are further apart than the rows
+    plane_doubt  rad and m (J, 2, N): what pitch and depth do where one of J moments at which the plane
+                stepped between its readings is off by a deviation; None where all of them are known
     counts      what was refused in the whole file, by cause
     notes       what was lost or decided on the user's behalf, one sentence each
     alarms      s, on the axis of time: when the vehicle was found to move no longer as it did
@@ -43,6 +48,8 @@ class Recording:
     step: float
     has_angle: bool = True
     has_moving_plane: bool = False
+    plane: PlaneReadings | None = None
+    plane_doubt: Array | None = None
     counts: Counter[str] = field(default_factory=Counter)
     notes: tuple[str, ...] = ()
     alarms: tuple[float, ...] = ()
@@ -72,6 +79,7 @@ class Recording:
             rudder=self.rudder[rows],
             speed=self.speed[rows],
             pitch_rate=self.pitch_rate[rows],
+            plane_doubt=None if self.plane_doubt is None else self.plane_doubt[:, :, rows],
             alarms=tuple(alarm for alarm in self.alarms if start <= alarm < end),
         )
 

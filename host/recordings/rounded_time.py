@@ -2,7 +2,8 @@
 
 Of times that repeat only the first row of each would count: of 10 Hz in seconds nine of ten were lost; and
 of 8 Hz in tenths of a second each row would be early or late by up to one. Where all rows lie within a
-rounding step of a straight line, time = start + pace * row, that line is the time.
+rounding step about a straight line, time = start + pace * row, that line is the time: rows of two sensors,
+each at its own pace, do not.
 """
 
 import numpy as np
@@ -12,6 +13,7 @@ from host.recordings.recording import Array
 ROUND = (10.0, 5.0, 1.0, 0.5, 0.25, 0.1, 0.05, 0.02, 0.01, 0.001)  # s
 LEAST_STEPS = 5  # distinct times, of which a pace can be told
 COARSE = 0.02  # of the pace: steps finer than that shift no row by what matters
+UNEVEN, ALIKE = 2.0, 1.05  # times the step, within which rows lie: of an uneven clock; of an even one
 
 
 def evenly_told(time: Array) -> tuple[Array, float] | None:
@@ -22,8 +24,9 @@ def evenly_told(time: Array) -> tuple[Array, float] | None:
     step = next((step for step in ROUND if _are_multiples(time - time[0], step)), 0.0)
     pace, start = np.polyfit(rows, time, 1)
     told = start + pace * rows
-    off = np.abs(time - told).max()
-    return (told, step) if COARSE * pace < off < step else None
+    off = float(np.ptp(time - told))
+    most = (UNEVEN if step > pace else ALIKE) * step
+    return (told, step) if COARSE * pace < off < most else None
 
 
 def _are_multiples(values: Array, step: float) -> bool:

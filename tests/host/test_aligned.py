@@ -48,6 +48,23 @@ def test_each_channel_is_taken_at_the_grid_from_its_own_times(tmp_path: Path) ->
     assert not recording.has_speed
 
 
+def test_a_plane_that_is_sent_seldom_keeps_its_readings(tmp_path: Path) -> None:
+    path = write(tmp_path / "dive.csv")
+    (whole,) = read_recordings(path, default_vehicle())
+    assert whole.plane is None
+    header, *rows = path.read_text().splitlines()
+    others = [row for row in rows if not row.split(",")[3]]
+    sent = [row for row in rows if row.split(",")[3]][::5]
+    lines = sorted([*others, *sent], key=lambda row: float(row.split(",")[0]))
+    path.write_text("\n".join([header, *lines]) + "\n")
+    (seldom,) = read_recordings(path, default_vehicle())
+    assert seldom.plane is not None
+    assert seldom.plane.is_slow
+    assert seldom.plane.time == pytest.approx(0.055 + 0.5 * np.arange(120), abs=1e-6)
+    assert seldom.plane.angle == pytest.approx(truth(seldom.plane.time)["rudder"])
+    assert seldom.plane.mean_moments == pytest.approx(0.5)
+
+
 def test_a_spike_is_left_out_before_it_spreads(tmp_path: Path) -> None:
     path = write(tmp_path / "dive.csv")
     lines = path.read_text().splitlines()

@@ -108,6 +108,14 @@ def test_times_that_repeat_without_a_pace_or_rows_written_twice_are_dropped(tmp_
         assert ("many rows repeat" in " ".join(found[0].notes)) == is_noted
 
 
+def test_rows_of_two_sensors_each_at_its_pace_are_not_rounded(tmp_path: Path) -> None:
+    times = sorted({*np.round(0.1 * np.arange(100), 3), *np.round(0.25 * np.arange(40), 3)})
+    lines = [f"{t:.3f},{10 + 0.1 * t:.4f},{0.01 * t:.4f},0.1" for t in times]
+    (recording,) = read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
+    assert recording.time == pytest.approx(times)
+    assert recording.notes == ()
+
+
 @pytest.mark.parametrize("every", [1, 3, 10, 20])
 def test_a_slow_speed_sensor_is_one(tmp_path: Path, every: int) -> None:
     lines = [f"{line},{2.0 + 0.01 * k if k % every == 0 else ''}" for k, line in enumerate(rows(60))]

@@ -97,7 +97,12 @@ def check_same_flight(recordings: list[Recording], simulated: list[Recording]) -
 def _as_steered(diagnosed: Diagnosis, recordings: list[Recording]) -> list[Recording]:
     """With what the plane was found to do between their rows."""
     return [
-        replace(one, rudder=each.rudder, has_moving_plane=each.has_moving_plane)
+        replace(
+            one,
+            rudder=each.rudder,
+            has_moving_plane=each.has_moving_plane,
+            plane_doubt=each.plane_doubt,
+        )
         for one, each in zip(recordings, diagnosed.recordings, strict=True)
     ]
 
@@ -139,6 +144,8 @@ def _seen(recording: Recording, one: Recording, floor: Array, rng: np.random.Gen
         depth=np.where(np.isfinite(recording.depth), depth + noise[1], np.nan),
         rudder=_rudder(one, recording.time),
         has_moving_plane=False,
+        plane=None,
+        plane_doubt=None,
         notes=(),
         speed=speed,
         pitch_rate=np.full(recording.time.size, np.nan),

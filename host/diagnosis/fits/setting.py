@@ -1,5 +1,6 @@
 """What all fits of one diagnosis share: recordings, noise floor, what is held, what drives the equations."""
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +23,7 @@ from host.likelihood.gauss_newton import Mask
 from host.noise.drift import drifts_of, whitenings
 from host.noise.noise_floor import noise_floor, resolution
 from host.noise.speed_error import speed_errors
+from host.noise.unseen_plane import unseen_plane
 from host.recordings.recording import Array, Recording, mean_speed
 from host.recordings.rounding import NO_STEPS, thinned
 
@@ -47,8 +49,8 @@ class Setting:
         self.recordings = recordings
         self.speed_errors, self.steps = speed_errors(recordings, self.floor[1], resolution(recordings))
         self.wander = wander
-        if self.wander.any():
-            self.steps = NO_STEPS  # what drifts takes errors for normal, as a filter does
+        if self.wander.any() or any(recording.plane_doubt is not None for recording in recordings):
+            self.steps = NO_STEPS  # what drifts, or was not seen, takes errors for normal, as a filter does
         self.thinned = thinned(recordings)
         self._told = thinned(recordings, self.steps)
         self._whitenings = [
@@ -119,7 +121,10 @@ class Setting:
         if kind not in self._inputs:
             rows = zip(self.thinned if for_filter else self._told, self._whitenings, strict=True)
             self._inputs[kind] = [
-                inputs_of(recording, structure, self.longest_substep, steps, whitening)
+                replace(
+                    inputs_of(recording, structure, self.longest_substep, steps, whitening),
+                    unseen=unseen_plane(recording.plane_doubt, _present(recording), self.floor),
+                )
                 for recording, whitening in rows
             ]
         shared = in_shared_equations(names)
@@ -141,3 +146,7 @@ class Setting:
         Larger ones excuse so much that how the filter's gain moves with the parameters hardly counts.
         """
         return bool((noise[2:4] < SLIGHT * np.square(self.accelerations)).all())
+
+
+def _present(recording: Recording) -> Array:
+    return np.isfinite(np.vstack([recording.pitch, recording.depth])).astype(float)

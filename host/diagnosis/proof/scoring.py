@@ -12,6 +12,7 @@ from host.dynamics.sensitivities import steered_run
 from host.identification.predict import SETTLING_SPAN, estimate_initial_state
 from host.likelihood.fit import Fit
 from host.noise.drift import drifts_of, whitenings
+from host.noise.unseen_plane import foreseen_unseen
 from host.recordings.recording import Array, Recording
 
 FORETOLD = 0.9  # of the squared error that is left: less than a tenth better is chance
@@ -122,9 +123,13 @@ def _errors_passing(explanation: Explanation, spans: Spans) -> tuple[list[Array]
 def _drifted(fit: Fit, taught: Recording, passed: Run) -> tuple[Array, Array]:
     """How far pitch and depth have drifted, as far as what was taught tells, and how far that may be off.
 
-    (2, N) each; the second is a variance in units of the sensor's white noise, which it includes.
+    Or were led off by a plane that stepped unseen. (2, N) each; the second is a variance in units of the
+    sensor's white noise, which it includes.
     """
-    left = np.nan_to_num(np.vstack([taught.pitch, taught.depth]) - passed.outputs)
+    measured = np.vstack([taught.pitch, taught.depth])
+    left = np.nan_to_num(measured - passed.outputs)
+    if taught.plane_doubt is not None:
+        return foreseen_unseen(taught.plane_doubt, left, np.isfinite(measured), fit.noise[:2])
     foreseen, doubt = np.zeros_like(left), np.ones_like(left)
     for i, filtered in enumerate(whitenings(*drifts_of(taught, None, fit.relative_wander))):
         if filtered is not None:

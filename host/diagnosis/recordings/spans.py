@@ -139,6 +139,11 @@ def _less(whole: Recording, run: Recording) -> Recording:
     )
 
 
+def runs_of(recordings: list[Recording]) -> list[Recording]:
+    """All of the recordings, in runs as short as those that teach, with nothing set aside."""
+    return [_begun(run) for recording in recordings for run in _runs(recording)]
+
+
 def _runs(recording: Recording) -> list[Recording]:
     count = max(1, round(recording.duration / LONGEST_RUN))
     edges = np.linspace(recording.time[0], recording.time[-1] + recording.step, count + 1)

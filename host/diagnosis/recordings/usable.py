@@ -10,7 +10,6 @@ from host.recordings.recording import Recording
 
 SHORTEST = 10.0  # s
 LARGEST_ANGLE = 1.6  # rad
-SELDOM = 0.3  # of the rows
 
 
 def check_usable(recordings: list[Recording]) -> None:
@@ -43,20 +42,9 @@ def with_plane_told(recordings: list[Recording]) -> list[Recording]:
             f"the plane was at up to {largest:.3g} rad, further than any can be: degrees or pulse widths "
             "need a unit or a scale in the vehicle file"
         )
-    elif any(_is_seldom_read(recording) for recording in recordings):
-        note = (
-            "the plane was read in some of the rows only: when it moved between its readings is not known, "
-            "and what its steps make of that is left as if it were physics"
-        )
     else:
         note = None
     return noted(recordings, note)
-
-
-def _is_seldom_read(recording: Recording) -> bool:
-    """Whether a table has the plane in few of its rows, and it is none of messages, with one in each."""
-    least = SELDOM * recording.counts["rows"]
-    return recording.counts["missing.rudder"] > least > recording.counts["missing.pitch"]
 
 
 def noted(recordings: list[Recording], note: str | None) -> list[Recording]:

@@ -1,0 +1,50 @@
+"""The readings of a plane in a table that has rows without one, or fills such rows.
+
+Loggers that bring a plane of a slower rate onto the clock of pitch leave its cells empty, repeat its last
+reading, or draw lines between two: then it turns at every second, or fifth, row only.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from host.recordings.plane_readings import UNSEEN, PlaneReadings
+from host.recordings.recording import Array
+from host.recordings.rounding import lattice
+
+LONGEST_HELD = 0.6  # s: a plane that repeats its angle for longer was told to
+FEWEST_TURNS = 20  # that tell a logger's pace from the plane's own
+ROUNDED = 2.5  # steps of the last digit, by which rows on a line may be off it
+ON_A_ROW = 0.1  # of a step
+
+
+def plane_readings(time: Array, rudder: Array, step: float) -> PlaneReadings | None:
+    """The readings in a table's column, rad (N,), NaN where it has none; None where each row has its own."""
+    known = np.flatnonzero(np.isfinite(rudder))
+    rows = known[_read(time[known], rudder[known], step)]
+    if rows.size < 2 or not (np.diff(time[rows]) > UNSEEN * step).any():
+        return None
+    return PlaneReadings(time[rows], rudder[rows], step, pace=step)
+
+
+def _read(time: Array, rudder: Array, step: float) -> NDArray[np.bool_]:
+    """Which of the rows were read, where a logger repeated readings in those that follow, or drew lines."""
+    slopes = np.diff(rudder) / np.diff(time)
+    rounding = max(ROUNDED * lattice([rudder]), 1e-9) / step
+    for turns in (np.flatnonzero(slopes), np.flatnonzero(np.abs(np.diff(slopes)) > rounding)):
+        read = _every_few(time, turns + 1, step)
+        if read is not None:
+            return read
+    return np.ones(time.size, dtype=bool)
+
+
+def _every_few(time: Array, turns: NDArray[np.intp], step: float) -> NDArray[np.bool_] | None:
+    """The rows of a pace on which all of these lie; None where each row may be one."""
+    if turns.size < FEWEST_TURNS:
+        return None
+    places = (time - time[turns[0]]) / step
+    if np.abs(places - np.rint(places))[turns].max() > ON_A_ROW:
+        return None
+    every = int(np.gcd.reduce(np.rint(places[turns]).astype(int)))
+    if every < 2 or every * step > LONGEST_HELD:
+        return None
+    return np.asarray(np.rint(places).astype(int) % every == 0)

@@ -1,0 +1,83 @@
+"""When a plane stepped that was read in few of the rows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hidden_dive import hidden_dive
+
+from host.diagnosis.diagnose import diagnose
+from host.diagnosis.plane_moments import with_plane_moments
+from host.diagnosis.recordings.spans import divide
+from host.diagnosis.recordings.unseen_steps import UnseenSteps
+from host.recordings.plane_in_table import plane_readings
+from host.recordings.recording import Array, Recording, split_at_gaps
+
+
+def read_every(dive: Recording, rows: int) -> Recording:
+    """The dive with a plane that was read in every so many rows, as its table is read."""
+    seen = np.where(np.arange(dive.time.size) % rows == 0, dive.rudder, np.nan)
+    told = replace(dive, rudder=seen, plane=plane_readings(dive.time, seen, dive.step))
+    (recording,) = split_at_gaps(told, 1.0)
+    return recording
+
+
+def drag(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+    return -1.5 * x[0] * abs(x[0]), 0.0, 0.0
+
+
+@pytest.mark.parametrize("rows", [2, 5])
+def test_each_step_is_put_where_it_was(rows: int) -> None:
+    true = hidden_dive()
+    seen = read_every(true, rows)
+    (moved,) = with_plane_moments([seen])
+    late, left = (np.std(one.rudder - true.rudder) for one in (seen, moved))
+    assert left < 0.3 * late
+    assert moved.notes[-1].startswith("the plane was read in few of the rows: when it stepped")
+    doubt = moved.plane_doubt
+    assert doubt is not None
+    assert doubt.shape == (UnseenSteps([seen]).mean.size, 2, seen.time.size)
+
+
+def test_a_plane_that_is_told_when_it_is_read_holds_until_then() -> None:
+    dive = hidden_dive()
+    assert with_plane_moments(whole := [dive]) is whole
+    count = 2 * dive.time.size
+    known = np.arange(count) % 2 == 0
+    between = {name: np.full(count, np.nan) for name in ("depth", "pitch", "rudder")}
+    for name, column in between.items():
+        column[known] = getattr(dive, name)
+    time, nan = 0.05 * np.arange(count), np.full(count, np.nan)
+    plane = plane_readings(time, between["rudder"], 0.05)
+    finer = replace(dive, time=time, speed=nan, pitch_rate=nan, step=0.05, plane=plane, **between)
+    told = split_at_gaps(finer, 1.0)
+    assert UnseenSteps(told).steps
+    assert with_plane_moments(told) is told
+
+
+def test_stretches_have_their_part_of_the_doubt() -> None:
+    (moved,) = with_plane_moments([read_every(hidden_dive(), 5)])
+    part = moved.between(20.0, 30.0)
+    assert moved.plane_doubt is not None
+    assert part.plane_doubt is not None
+    assert np.array_equal(part.plane_doubt, moved.plane_doubt[:, :, 200:300])
+    (teaching,) = divide([moved]).teaching
+    assert teaching.plane_doubt is not None
+    assert teaching.plane_doubt.shape[2] == teaching.time.size
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("rows", [2, 5])
+def test_drag_is_named_although_the_plane_was_hardly_read(rows: int) -> None:
+    found = diagnose([read_every(hidden_dive(drag), rows)])
+    assert found.verdict == "explained"
+    assert [effect.name for effect in found.effects] == ["heave_quadratic_drag"]
+    value, std, _ = found.effects[0].coefficients["c_ww"]
+    assert value == pytest.approx(-1.5, abs=3.0 * std)
+
+
+@pytest.mark.long
+def test_nothing_is_named_where_nothing_is_hidden() -> None:
+    found = diagnose([read_every(hidden_dive(), 5)])
+    assert found.verdict == "no_mismatch"
+    assert found.effects == []
