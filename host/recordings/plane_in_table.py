@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from host.recordings.plane_readings import UNSEEN, PlaneReadings
 from host.recordings.recording import Array
-from host.recordings.rounding import lattice
 
 LONGEST_HELD = 0.6  # s: a plane that repeats its angle for longer was told to
 FEWEST_TURNS = 20  # that tell a logger's pace from the plane's own
-ROUNDED = 2.5  # steps of the last digit, by which rows on a line may be off it
+ROUNDED = 0.02  # of the sharpest bend: what lines seem to bend where their points are rounded
 ON_A_ROW = 0.1  # of a step
 
 
@@ -29,8 +28,8 @@ def plane_readings(time: Array, rudder: Array, step: float) -> PlaneReadings | N
 def _read(time: Array, rudder: Array, step: float) -> NDArray[np.bool_]:
     """Which of the rows were read, where a logger repeated readings in those that follow, or drew lines."""
     slopes = np.diff(rudder) / np.diff(time)
-    rounding = max(ROUNDED * lattice([rudder]), 1e-9) / step
-    for turns in (np.flatnonzero(slopes), np.flatnonzero(np.abs(np.diff(slopes)) > rounding)):
+    bends = np.abs(np.diff(slopes))
+    for turns in (np.flatnonzero(slopes), np.flatnonzero(bends > ROUNDED * bends.max(initial=0.0))):
         read = _every_few(time, turns + 1, step)
         if read is not None:
             return read

@@ -98,10 +98,24 @@ def test_exact_times_and_those_of_an_uneven_clock_stay_as_they_are(tmp_path: Pat
     assert recording.notes == ()
 
 
-def test_times_that_repeat_without_a_pace_or_rows_written_twice_are_dropped(tmp_path: Path) -> None:
-    paused = [f"{int(0.1 * k) + 30 * (k > 100)},{10 + 0.01 * k:.4f},{0.001 * k:.4f},0.1" for k in range(200)]
+def test_rows_that_share_a_time_are_spread_where_others_were_lost_or_none_came(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    exact = 0.45 + 0.1 * np.arange(400)[rng.random(400) > 0.05]
+    exact[exact > 20.0] += 30.0
+    lines = [f"{int(t)},{10 + 0.01 * t:.4f},{0.001 * t:.4f},0.1" for t in exact]
+    found = read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
+    assert [one.time.size for one in found] == [np.sum(exact < 20.0), np.sum(exact > 20.0)]
+    time = np.concatenate([one.time for one in found])
+    assert np.abs(time - exact - np.median(time - exact)).max() < 0.2
+    assert np.std(time - exact) < 0.05
+    assert found[0].notes == ("its times are rounded to 1 s: the rows are taken as evenly spaced",)
+
+
+def test_two_rows_of_a_time_or_rows_written_twice_are_dropped(tmp_path: Path) -> None:
+    pairs = [f"{int(2.0 * k) // 4},{10 + 0.01 * k:.4f},{0.001 * k:.4f},0.1" for k in range(200)]
+    pairs[100:] = [f"{int(line.split(',')[0]) + 30},{line.split(',', 1)[1]}" for line in pairs[100:]]
     twice = [line for line in rows(50) for _ in range(2)]
-    for lines, left, is_noted in ((paused, 21, True), (twice, 50, False)):
+    for lines, left, is_noted in ((pairs, 100, True), (twice, 50, False)):
         found = read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
         assert sum(recording.time.size for recording in found) == left
         assert found[0].counts["refused.time_not_advancing"] == len(lines) - left
