@@ -27,7 +27,7 @@ def with_moving_plane(recording: Recording) -> Recording:
     """The recording with the mean angles of a plane that moves on evenly."""
     if recording.has_moving_plane:
         return recording
-    if recording.plane is not None and recording.plane.is_slow:
+    if recording.plane is not None and _counts(recording.plane):
         return between_readings(recording, recording.plane)
     slopes = np.diff(recording.rudder) / np.diff(recording.time)
     if slopes.size < 3:
@@ -62,13 +62,19 @@ def ways_between(recordings: list[Recording]) -> list[list[Recording]]:
     row to row.
     """
     others = [[with_moving_plane(recording) for recording in recordings]]
-    if any(one.plane is not None and one.plane.is_slow and one.plane.pace > 0.0 for one in recordings):
-        others.append([_in_rows(recording) for recording in recordings])
+    planes = [recording.plane for recording in recordings if recording.plane is not None]
+    if any(_counts(plane) and plane.pace > 0.0 for plane in planes):
+        others.append([_from_row_to_row(recording) for recording in recordings])
     return [recordings, *(other for other in others if not _are_alike(recordings, other))]
 
 
-def _in_rows(recording: Recording) -> Recording:
-    if recording.has_moving_plane or recording.plane is None or not recording.plane.is_slow:
+def _counts(plane: PlaneReadings) -> bool:
+    """Whether its readings count in place of the rows: of a plane that steps only where most have none."""
+    return plane.is_slow or not plane.is_stepping
+
+
+def _from_row_to_row(recording: Recording) -> Recording:
+    if recording.has_moving_plane or recording.plane is None or not _counts(recording.plane):
         return recording
     return between_readings(recording, recording.plane, holds_between=True)
 

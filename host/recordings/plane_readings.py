@@ -1,9 +1,8 @@
 """What a plane did between its readings, where these are further apart than the rows.
 
-A command that is logged, or sent, less often than pitch stands in several rows, and rows may be lost. Where
-the plane went from delta_i to delta_(i+1) unseen, it either moved on evenly, or it stepped at a moment
-T_i + f_i (T_(i+1) - T_i) that nobody recorded. One that repeats its readings steps; another is taken to have
-moved as evenly as it did beside, as in host.recordings.plane_between_rows, and the rest is a step. A row's
+A command that is logged, or sent, less often than pitch stands in several rows, and rows may be lost. A plane
+that repeats its readings steps: from delta_i to delta_(i+1) at a moment T_i + f_i (T_(i+1) - T_i) that nobody
+recorded. Another swings through its readings, as Akima's curve does, but where it moved at once. A row's
 angle is the mean until the next row.
 
 What a table tells steps at its rows, as where each row has a reading: of the k rows up to the next reading it
@@ -15,10 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import Akima1DInterpolator
 
 Array = NDArray[np.float64]
 UNSEEN = 1.5  # steps between two readings, beyond which one is missing
-STEPPING = 0.3  # of the readings that repeat the one before: no plane that moves on evenly does
+STEPPING = 0.3  # of the readings that repeat the one before
+JUMP = 5.0  # times as fast as just before and just after: no swing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +45,7 @@ class PlaneReadings:
     @property
     def steps(self) -> NDArray[np.intp]:
         """The intervals between two readings in which the plane stepped unseen."""
-        return np.flatnonzero(self._is_unseen & (np.abs(self._rest()) > 0.0))
+        return np.flatnonzero(self._is_unseen & (self._jumps() != 0.0))
 
     @property
     def mean_moments(self) -> Array:
@@ -60,21 +61,24 @@ class PlaneReadings:
         return np.minimum(self.pace / np.diff(self.time)[self.steps], 1.0)
 
     @property
+    def is_stepping(self) -> bool:
+        """Whether it holds its angle from step to step, as no plane that swings does."""
+        return bool(np.mean(np.diff(self.angle) == 0.0) > STEPPING)
+
+    @property
     def _is_unseen(self) -> NDArray[np.bool_]:
         return np.diff(self.time) > UNSEEN * self.step
 
-    def _even(self) -> Array:
-        """rad/s in each interval (K - 1,), of what moved on evenly; 0 where the plane was seen to hold."""
+    def _jumps(self) -> Array:
+        """rad in each interval (K - 1,): all that a stepping plane moved, and what another did at once."""
         changes = np.diff(self.angle)
-        if np.mean(changes == 0.0) > STEPPING:
-            return np.zeros_like(changes)
-        slopes = changes / np.diff(self.time)
-        padded = np.abs(np.pad(slopes, 1, mode="edge"))
-        beside = 2.0 * np.maximum(padded[:-2], padded[2:])
-        return np.where(self._is_unseen, np.clip(slopes, -beside, beside), 0.0)
-
-    def _rest(self) -> Array:
-        return np.diff(self.angle) - self._even() * np.diff(self.time)
+        if self.is_stepping:
+            return changes
+        gaps = np.diff(self.time)
+        slopes = np.pad(changes / gaps, 1, mode="edge")
+        before, here, after = slopes[:-2], slopes[1:-1], slopes[2:]
+        is_jump = np.abs(here) > JUMP * np.maximum(np.abs(before), np.abs(after))
+        return np.where(is_jump & self._is_unseen, changes - gaps * (before + after) / 2.0, 0.0)
 
     def means(
         self, begins: Array, ends: Array, moments: Array | None = None, holds_between: bool = False
@@ -82,22 +86,23 @@ class PlaneReadings:
         """Mean angle, rad (N,), from each of `begins` to each of `ends`, s.
 
         moments  f of each of `steps`, 0 to 1; left out, their means. What was seen steps at a reading.
-        holds_between  whether what moved evenly from reading to reading was held from `begins` to `ends`
+        holds_between  whether what swings was held from row to row of those that nobody read, too
         """
-        gaps, at = np.diff(self.time), np.ones(self.time.size - 1)
+        gaps, at, jumps = np.diff(self.time), np.ones(self.time.size - 1), self._jumps()
         at[self.steps] = self.mean_moments if moments is None else moments
-        jumps, rest = self.time[:-1] + at * gaps, self._rest()
-        levels = self.angle[0] + np.append(0.0, np.cumsum(rest))
-        areas = np.append(0.0, np.cumsum(levels[1:-1] * np.diff(jumps)))
+        jumped, moved = self.time[:-1] + at * gaps, np.append(0.0, np.cumsum(jumps))
+        areas = np.append(0.0, np.cumsum(moved[1:-1] * np.diff(jumped)))
 
         def area(t: Array) -> Array:
             """Under the steps, from the first of them on."""
-            passed = np.searchsorted(jumps, t, side="right")
-            since = t - jumps[np.maximum(passed - 1, 0)]
-            return np.asarray(areas[np.maximum(passed - 1, 0)] + levels[passed] * since)
+            passed = np.searchsorted(jumped, t, side="right")
+            since = t - jumped[np.maximum(passed - 1, 0)]
+            return np.asarray(areas[np.maximum(passed - 1, 0)] + moved[passed] * since)
 
-        evenly = np.append(0.0, np.cumsum(self._even() * gaps))
-        reached = np.interp(begins, self.time, evenly)
-        if not holds_between:
-            reached = (reached + np.interp(ends, self.time, evenly)) / 2.0
-        return np.asarray((area(ends) - area(begins)) / (ends - begins) + reached)
+        swing = Akima1DInterpolator(self.time, self.angle - moved)
+        late = self.pace / 2.0 if holds_between else 0.0
+        early, middle, end = (
+            swing(np.clip(t - late, self.time[0], self.time[-1]))
+            for t in (begins, (begins + ends) / 2.0, ends)
+        )
+        return np.asarray((area(ends) - area(begins)) / (ends - begins) + (early + 4.0 * middle + end) / 6.0)

@@ -15,6 +15,7 @@ from host.diagnosis.proof.verdict import (
     Verdict,
     beyond_bounds_in,
     beyond_geometry_in,
+    breaking_in,
     cancelling_in,
     rare_in,
     remaining,
@@ -175,6 +176,18 @@ def test_what_no_hull_makes_of_its_water_is_doubted(
     assert ("larger than on any hull" in said) == is_doubted
     beside = verdict_on(best, leftover(is_smooth=True), misfit(5.0), misfit(1.0))
     assert beside == ("unexplained" if is_doubted else "partly_explained")
+
+
+@pytest.mark.parametrize(("speed", "is_doubted"), [(2.0, False), (4.0, False), (9.0, True)])
+def test_waves_that_would_have_broken_are_doubted(base: Explanation, speed: float, is_doubted: bool) -> None:
+    fit, names = base.fit, frozenset({"surface_waves"})
+    known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
+    known |= {"wave_sine": 0.6 * speed, "wave_cosine": -0.8 * speed, "wave_period": 4.0}  # breaks at 2.7 m/s
+    best = explanation_with(base, names, known)
+    assert breaking_in(best) == ["surface_waves"] * is_doubted
+    verdict = verdict_on(best, leftover(), misfit(5.0), misfit(1.0))
+    assert verdict == ("partly_explained" if is_doubted else "explained")
+    assert ("would have broken" in remaining(verdict, best, leftover(), misfit(1.0))) == is_doubted
 
 
 @pytest.mark.parametrize(

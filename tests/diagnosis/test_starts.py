@@ -428,3 +428,21 @@ def test_a_set_that_runs_away_without_an_effect_begins_anew_from_the_motion() ->
     start = fitter.point(held.names - {"pitch_quadratic_damping"}, held)
     assert not np.isfinite(fitter.fitted([start]).log_likelihood)
     assert fitter.excess(fitter.shrunk(held, "pitch_quadratic_damping").fit) < 1.1
+
+
+def test_a_buoyancy_beside_a_lag_is_found_although_each_alone_is_far_off() -> None:
+    structure = structure_of(("depth_dependent_buoyancy", "pitch_sensor_lag"))
+    rows = replace(hidden_dive(duration=300.0), speed=np.full(3000, 1.0))
+    rows.rudder[:30] = 0.0  # from where a lagging reading begins
+    hull = {"a1": -1.1, "a2": -7.9, "a3": -0.68, "b1": -0.42, "b2": -4.5, "u0": 1.0}
+    known = {**hull, "heave_offset": 0.0, "pitch_offset": 0.0}
+    known |= {"c_wz": 0.0025, "neutral_depth": 20.0, "pitch_lag_time": 1.04}
+    values = np.array([known[name] for name in structure.names])
+    pitch, depth = free_run(values, AT_REST, inputs_of(rows, structure)).outputs
+    noise = np.array([[7e-4], [3e-3]]) * np.random.default_rng(2).standard_normal((2, rows.time.size))
+    fitter = Fitter([replace(rows, pitch=pitch + noise[0], depth=depth + noise[1])])
+    lagging = fitter.grown(fitter.root, "pitch_sensor_lag", [])
+    assert fitter.excess(lagging.fit) > 5.0
+    found = fitter.grown(lagging, "depth_dependent_buoyancy", [])
+    assert fitter.excess(found.fit) < 1.1
+    assert found.fit.parameters[structure.names.index("pitch_lag_time")] == pytest.approx(1.04, rel=0.05)

@@ -60,10 +60,13 @@ def starts_again(
     """Starts of the same set where the end of its first fit may lie in a poor valley.
 
     Points of much the same motion, or with the heave or the pitch of a usual vehicle, or with other moments.
+    A parent that lacks what joins may have put its poles in each other's place: that is asked of its set,
+    too, where much is left.
     """
     fit = end.fit
     at = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
-    starts = look_alikes(at) if named(name).parameters[0].name in SHARING_POLES else []
+    sharing = at.structure.names if is_far(fitter, end) else (named(name).parameters[0].name,)
+    starts = look_alikes(at) if {*SHARING_POLES} & {*sharing} else []
     if not has_usual_heave(at):
         starts += with_usual_heave(at)
     return starts + with_usual_pitch(fitter, parent, name, values) + with_other_moments(fitter, end)

@@ -8,12 +8,13 @@ So do forces of no sea: what moves the water around a hull turns it as well as i
 And a hull that no water makes explains no part of what leaves something beside it.
 """
 
-from math import inf, pi, sqrt
+from math import hypot, inf, pi, sqrt
 from typing import Literal
 
 import numpy as np
 
 from host.catalogue import BY_NAME, FAINT, ORDINARY
+from host.catalogue.gravity import GRAVITY
 from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import SPEED_CORRECTION
 from host.diagnosis.fits.explanation import Explanation
@@ -49,6 +50,7 @@ LEAST_LEVER = 1.0  # 1/m, of the plane's moment over its force: less is a plane 
 LARGEST_SHARE = 4.0  # of what geometry gives, that bounds allow
 CERTAIN = 3.0  # deviations of a Munk moment
 HARDLY_TURNED = 0.01  # of the density of the moment that moving water has beside its force
+STEEPEST, NO_SEA = 0.44, 2.0  # slope of a breaking wave; times that, so that no estimate is off so far
 NEARLY = 1.0 - 1e-6  # of a bound: at it
 KNOWN = 1.0 / 3.0  # of it, is what a deviation may be there, if to end at a bound is to tell anything
 
@@ -157,6 +159,21 @@ def beyond_geometry_in(explanation: Explanation) -> list[str]:
     return [name for name, size in sizes.items() if name in explanation.names and size > 1.0]
 
 
+def breaking_in(explanation: Explanation) -> list[str]:
+    """Waves so steep that they would have broken: their water is faster at the surface than 0.44 g / omega.
+
+    A swing as small as a sensor's noise, far down, would be that of a sea that nobody sails.
+    """
+    if "surface_waves" not in explanation.names:
+        return []
+    fit = explanation.fit
+    p = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
+    if "wave_period" not in p:  # many waves, of which no amplitude is estimated
+        return []
+    most = STEEPEST * GRAVITY * p["wave_period"] / (2.0 * pi)
+    return ["surface_waves"] if hypot(p["wave_sine"], p["wave_cosine"]) > NO_SEA * most else []
+
+
 def is_pushed_but_not_turned(explanation: Explanation) -> bool:
     """Whether the random forces are no moving water's: they shake heave alone, of a hull with a Munk moment.
 
@@ -189,6 +206,7 @@ def _doubt(explanation: Explanation, left: Leftover, waves: float) -> str:
         (cancelling_in(explanation), "cancel: together"),
         (beyond_bounds_in(explanation), "would have to be larger than on any vehicle:"),
         (beyond_geometry_in(explanation), "would have to be larger than on any hull:"),
+        (breaking_in(explanation), "would have broken:"),
     )
     for names, why in reasons:
         if names:

@@ -32,6 +32,7 @@ from host.diagnosis.search.pruning import pruned
 from host.diagnosis.search.together import with_more
 from host.diagnosis.search.whole_vehicle import all_beside, ended, is_real
 from host.likelihood.gauss_newton import Point
+from host.likelihood.valleys import has_usual_heave
 
 if TYPE_CHECKING:
     from host.diagnosis.search.search import Search
@@ -173,10 +174,17 @@ def goes_on_from(search: "Search", joint: Explanation) -> bool:
     if not (more.leaves_white or search.fitter.excess(more.fit) < LITTLE):
         more = min(more, _with_a_form(search, joint), key=lambda e: e.bic)
     is_all = more.leaves_white or search.fitter.excess(more.fit) < LITTLE
-    if is_all and is_real(pruned(search, more).names):
+    if is_all and _is_of_a_hull(pruned(search, more)):
         return True
     search.joint.clear()  # beside what the search finds they are tried again
     return False
+
+
+def _is_of_a_hull(found: Explanation) -> bool:
+    """Whether a set shows a vehicle as they are built, and its heave is damped as theirs is."""
+    fit = found.fit
+    point = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+    return is_real(found.names) and has_usual_heave(point)
 
 
 def _with_a_form(search: "Search", whole: Explanation) -> Explanation:
