@@ -15,6 +15,7 @@ class UnseenSteps:
 
     steps     the recording of each, and its place among the steps of that
     mean, variance  of their moments (J,), before anything is known of them
+    rows      at how many instants each may have been; nan where at any
     """
 
     def __init__(self, recordings: list[Recording]) -> None:
@@ -28,6 +29,16 @@ class UnseenSteps:
         self.steps = sorted(sorted(sizes, key=lambda step: -sizes[step])[:MOST_STEPS])
         self.mean = np.array([self._plane(i).mean_moments[k] for i, k in self.steps])
         self.variance = np.array([self._plane(i).moment_variances[k] for i, k in self.steps])
+
+        gaps = np.array([np.diff(self._plane(i).time)[self._plane(i).steps][k] for i, k in self.steps])
+        paces = np.array([self._plane(i).pace for i, _ in self.steps])
+        self.rows = np.rint(gaps / np.where(paces > 0.0, paces, np.nan))
+
+    def on_rows(self, moments: Array) -> Array | None:
+        """The nearest of moments (J,) at which there are rows; None where a step may be at any."""
+        if not np.isfinite(self.rows).all():
+            return None
+        return np.asarray(np.clip(np.rint(moments * self.rows), 1.0, self.rows) / self.rows)
 
     def off(self, moments: Array) -> float:
         """-2 log of the prior of these moments (J,), but for a constant."""
