@@ -17,6 +17,7 @@ from host.recordings.rounded_time import evenly_told
 
 CHANNELS = ("depth", "pitch", "rudder", "speed", "pitch_rate")
 _MANY = 0.1  # share of a column
+_SELDOM = 0.05  # of the rows: as many may follow too soon
 _LONGEST_STEP = 30.0  # s
 
 
@@ -104,10 +105,15 @@ def read_table(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> 
         pitch_rate=values["pitch_rate"],
         step=step,
         has_angle=columns.rudder.unit != "raw" or columns.rudder.scale != 1.0,
-        plane=plane_readings(time, values["rudder"], step),
+        plane=plane_readings(time, values["rudder"], _pace(time[np.isfinite(values["pitch"])], step)),
         counts=counts,
         notes=notes,
     )
+
+
+def _pace(time: Array, usual: float) -> float:
+    """s from row to row where none is lost; of rows that come at any time `usual`."""
+    return min(float(np.quantile(np.diff(time), _SELDOM)), usual) if time.size > 1 else usual
 
 
 def _repeated_times(values: dict[str, Array]) -> tuple[float, bool]:

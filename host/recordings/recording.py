@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 NEEDED = ("depth", "pitch", "rudder")
 LONGEST_BETWEEN_SPEEDS = 2.5  # s, between two readings: a manoeuvre slows the vehicle within a few
 STANDING = 0.02  # m/s
+USUAL_GAPS = 5.0  # of those between two readings of the plane, beyond which it is lost
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,15 +90,19 @@ def split_at_gaps(
 ) -> list[Recording]:
     """Cuts where rows are further apart than `longest_hold` s, or where the rudder is unknown for that long.
 
-    A shorter loss of the rudder is bridged by holding its last value, as the actuator does. Stretches
-    that hold fewer than ten rows, or nothing at all of a needed channel, are dropped.
+    A shorter loss of the rudder is bridged by holding its last value, as the actuator does; of one that is
+    read seldom longer ones are no loss. Stretches that hold fewer than ten rows, or nothing at all of a
+    needed channel, are dropped.
     """
+    longest_unread = longest_hold
+    if recording.plane is not None:
+        longest_unread = max(longest_hold, USUAL_GAPS * float(np.median(np.diff(recording.plane.time))))
     known = np.isfinite(recording.rudder)
     rows = np.arange(recording.time.size)
     last_known = np.maximum.accumulate(np.where(known, rows, -1))
     reachable = last_known >= 0
     held = recording.time - recording.time[np.maximum(last_known, 0)]
-    usable = reachable & (held <= longest_hold)
+    usable = reachable & (held <= longest_unread)
     rudder = np.where(usable, recording.rudder[np.maximum(last_known, 0)], np.nan)
     filled = replace(recording, rudder=rudder)
     starts_anew = np.diff(recording.time, prepend=recording.time[0]) > longest_hold

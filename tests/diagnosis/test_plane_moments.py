@@ -59,6 +59,9 @@ def test_a_plane_that_is_told_when_it_is_read_holds_until_then() -> None:
 def test_stretches_have_their_part_of_the_doubt() -> None:
     (moved,) = with_plane_moments([read_every(hidden_dive(), 5)])
     part = moved.between(20.0, 30.0)
+    within = UnseenSteps([part])
+    assert 0 < len(within.steps) < len(UnseenSteps([moved]).steps)
+    assert len(within.within(0, part)) == len(within.steps)
     assert moved.plane_doubt is not None
     assert part.plane_doubt is not None
     assert np.array_equal(part.plane_doubt, moved.plane_doubt[:, :, 200:300])

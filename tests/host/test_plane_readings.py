@@ -126,6 +126,34 @@ def test_means_lie_among_the_readings_and_add_up(
     assert np.sum(means * np.diff(edges)) == pytest.approx(float(whole[0]) * np.ptp(edges), abs=1e-9)
 
 
+def test_a_slow_plane_of_a_table_that_lost_rows_is_one_stretch(tmp_path: Path) -> None:
+    cells = ["" if np.isnan(a) else f"{a:.3f}" for a in read_every(stepping(), 10, "empty")]
+    lines = [f"{t:.1f},{10 + 0.1 * t:.3f},0.0,{cell}" for t, cell in zip(TIME, cells, strict=True)]
+    kept = np.random.default_rng(3).random(TIME.size) > 0.3
+    kept[0] = True
+    path = tmp_path / "slow.csv"
+    lines = [line for line, is_kept in zip(lines, kept, strict=True) if is_kept]
+    path.write_text("\n".join(["time_s,depth_m,pitch_rad,rudder_rad", *lines]))
+    (recording,) = read_csv_recording(path, CsvMap())
+    assert recording.plane is not None
+    assert np.diff(recording.plane.time).max() > 1.5
+    assert recording.time.size == kept.sum()
+
+
+def test_where_most_rows_are_lost_those_that_are_left_do_not_tell_all(tmp_path: Path) -> None:
+    kept = np.random.default_rng(2).random(TIME.size) > 0.6
+    lines = [f"{t:.1f},{10 + 0.1 * t:.3f},0.0,{a:.3f}" for t, a in zip(TIME, stepping(), strict=True)]
+    path = tmp_path / "lost.csv"
+    lines = [line for line, is_kept in zip(lines, kept, strict=True) if is_kept]
+    path.write_text("\n".join(["time_s,depth_m,pitch_rad,rudder_rad", *lines]))
+    recording, *_ = read_csv_recording(path, CsvMap())
+    assert recording.step == pytest.approx(0.2)
+    assert recording.plane is not None
+    assert recording.plane.pace == pytest.approx(0.1)
+    changes, gaps = np.diff(recording.plane.angle), np.diff(recording.plane.time)
+    assert recording.plane.steps.size == np.count_nonzero((changes != 0.0) & (gaps > 0.15))
+
+
 def test_a_recording_is_moved_once(tmp_path: Path) -> None:
     cells = ["" if np.isnan(a) else f"{a:.3f}" for a in read_every(stepping(), 5, "empty")]
     lines = [f"{t:.1f},{10 + 0.1 * t:.3f},0.0,{cell}" for t, cell in zip(TIME, cells, strict=True)]

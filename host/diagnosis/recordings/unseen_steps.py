@@ -1,6 +1,7 @@
 """The steps of a plane that nobody saw, and what it did with each at a given moment."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from host.recordings.plane_between_rows import between_readings
 from host.recordings.plane_readings import PlaneReadings
@@ -25,6 +26,7 @@ class UnseenSteps:
             for i, one in enumerate(recordings)
             if one.plane is not None
             for k, size in enumerate(np.abs(np.diff(one.plane.angle))[one.plane.steps].tolist())
+            if _inside(one.plane, one)[k]
         }
         self.steps = sorted(sorted(sizes, key=lambda step: -sizes[step])[:MOST_STEPS])
         self.mean = np.array([self._plane(i).mean_moments[k] for i, k in self.steps])
@@ -62,9 +64,7 @@ class UnseenSteps:
         """Which of the J steps fall into a run of a recording."""
         if self.recordings[recording].plane is None:
             return []
-        plane = self._plane(recording)
-        begins, ends = plane.time[plane.steps], plane.time[plane.steps + 1]
-        inside = (begins < run.time[-1]) & (ends > run.time[0])
+        inside = _inside(self._plane(recording), run)
         return [j for j, (i, k) in enumerate(self.steps) if i == recording and inside[k]]
 
     def _all(self, recording: int, moments: Array) -> Array:
@@ -78,3 +78,9 @@ class UnseenSteps:
         plane = self.recordings[recording].plane
         assert plane is not None
         return plane
+
+
+def _inside(plane: PlaneReadings, run: Recording) -> NDArray[np.bool_]:
+    """Which of a plane's steps fall into a run."""
+    begins, ends = plane.time[plane.steps], plane.time[plane.steps + 1]
+    return np.asarray((begins < run.time[-1]) & (ends > run.time[0]))
