@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import Akima1DInterpolator
 
 Array = NDArray[np.float64]
 UNSEEN = 1.5  # steps between two readings, beyond which one is missing
@@ -88,6 +87,8 @@ class PlaneReadings:
         moments  f of each of `steps`, 0 to 1; left out, their means. What was seen steps at a reading.
         holds_between  whether what swings was held from row to row of those that nobody read, too
         """
+        from scipy.interpolate import Akima1DInterpolator  # tables are replayed where there is no scipy
+
         gaps, at, jumps = np.diff(self.time), np.ones(self.time.size - 1), self._jumps()
         at[self.steps] = self.mean_moments if moments is None else moments
         jumped, moved = self.time[:-1] + at * gaps, np.append(0.0, np.cumsum(jumps))

@@ -213,22 +213,32 @@ def test_where_it_leads_nowhere_water_may_swing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("pays", "left", "with_form", "said"),
+    ("pays", "a1", "left", "with_form", "said"),
     [
-        (MANY, 1.3, 1.4, ["concluded"]),  # of white noise, whose size the sensors show too small
-        (MANY, 1.1, 1.4, ["concluded"]),
-        (FEW, 1.0, 1.4, ["singles", "concluded"]),
-        (MANY, 1.4, 1.4, ["singles", "concluded"]),
-        (MANY, 1.4, 1.3, ["concluded"]),
-        (FEW, 1.4, 1.3, ["singles", "concluded"]),
+        (MANY, -0.6, 1.3, 1.4, ["concluded"]),  # of white noise, whose size the sensors show too small
+        (MANY, -0.6, 1.1, 1.4, ["concluded"]),
+        (FEW, -0.6, 1.0, 1.4, ["singles", "concluded"]),
+        (MANY, -1e-6, 1.1, 1.4, ["singles", "concluded"]),
+        (MANY, -0.6, 1.4, 1.4, ["singles", "concluded"]),
+        (MANY, -0.6, 1.4, 1.3, ["concluded"]),
+        (FEW, -0.6, 1.4, 1.3, ["singles", "concluded"]),
     ],
-    ids=["white", "little", "few", "something left", "a form", "a form beside few"],
+    ids=["white", "little", "few", "no damping", "something left", "a form", "a form beside few"],
 )
 def test_a_search_goes_on_with_many_or_begins_with_single_effects(
-    pays: frozenset[str], left: float, with_form: float, said: list[str], monkeypatch: pytest.MonkeyPatch
+    pays: frozenset[str],
+    a1: float,
+    left: float,
+    with_form: float,
+    said: list[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def found(names: frozenset[str], left: float = left) -> Any:
-        fit, white = SimpleNamespace(left=left), left == 1.3
+        hull = np.array([a1, -3.4, -8.2, 0.4, -3.9, 2.5])
+        fit, white = (
+            SimpleNamespace(left=left, structure=None, parameters=hull, initial=[], noise=[]),
+            left == 1.3,
+        )
         return SimpleNamespace(names=names, bic=left, fit=fit, leaves_white=white, lean=lambda: found(names))
 
     calls: list[str] = []
