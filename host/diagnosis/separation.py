@@ -268,6 +268,7 @@ def _blank(flown: Manoeuvre, like: Recording) -> Recording:
         rudder=flown.rudder,
         plane=None,
         plane_doubt=None,
+        own_rows=None,
         step=flown.step,
     )
 

@@ -16,6 +16,7 @@ from host.live.align import AlignConfig, Aligner
 from host.recordings.outliers import CHANNELS, outliers, told
 from host.recordings.plane_readings import PlaneReadings
 from host.recordings.recording import NEEDED, Array, Recording, split_at_gaps
+from host.recordings.slow_depth import with_own_rows
 
 ONE_CHANNEL = 0.5  # of the rows that tell depth: at most so many tell pitch, too, where each has its own
 FEWEST = 10  # messages of either
@@ -66,6 +67,7 @@ def aligned(messages: Messages, config: AlignConfig, needs: tuple[str, ...] = NE
         if segment.samples:
             whole = _recording(messages, segment, config, counts)
             whole = replace(whole, rudder=_bridged(whole.rudder, round(longest / config.step)))
+            whole = with_own_rows(whole, *_sent(Quantity.DEPTH, messages, segment))
             pieces += split_at_gaps(whole, longest, needs)
     return pieces
 
@@ -147,27 +149,36 @@ def _recording(messages: Messages, segment: _Segment, config: AlignConfig, count
         pitch_rate=np.array([sample.pitch_rate for sample in samples]),
         step=config.step,
         has_angle=messages.has_angle,
-        plane=None if config.rudder_on_change else _plane(messages, segment, config.step, begins),
+        plane=None if config.rudder_on_change else _plane(messages, segment, config.step),
         counts=counts,
         notes=messages.notes,
         alarms=tuple(1e-6 * (t_us - begins) for t_us in marked),
     )
 
 
-def _plane(messages: Messages, segment: _Segment, step: float, begins: int) -> PlaneReadings | None:
+def _plane(messages: Messages, segment: _Segment, step: float) -> PlaneReadings | None:
     """The readings of a plane that was sent more seldom than there are samples; None of any other."""
-    first, last = segment.samples[0].t_us - BESIDE, segment.samples[-1].t_us + BESIDE
+    time, angle = _sent(Quantity.RUDDER, messages, segment)
+    if time.size < FEWEST:
+        return None
+    plane = PlaneReadings(time, angle, step)
+    return plane if plane.is_slow else None
+
+
+def _sent(quantity: Quantity, messages: Messages, segment: _Segment) -> tuple[Array, Array]:
+    """Times s, on the recording's axis, and values of a channel's messages about a segment, as they come."""
+    first, last = segment.samples[0].t_us, segment.samples[-1].t_us
+    begins = 0 if messages.starts_at_zero else first
     sent = [
         (1e-6 * (one.t_us - begins), one.value)
         for one in messages.measurements
-        if one.quantity is Quantity.RUDDER and one.boot == segment.boot and first <= one.t_us <= last
+        if one.quantity is quantity
+        and one.boot == segment.boot
+        and first - BESIDE <= one.t_us <= last + BESIDE
     ]
-    time, angle = np.array(sent).reshape(-1, 2).T
-    later = np.diff(np.maximum.accumulate(time), prepend=-np.inf) > 0.0
-    if later.sum() < FEWEST:
-        return None
-    plane = PlaneReadings(time[later], angle[later], step)
-    return plane if plane.is_slow else None
+    time, values = np.array(sent).reshape(-1, 2).T
+    advancing = np.diff(np.maximum.accumulate(time), prepend=-np.inf) > 0.0
+    return time[advancing], values[advancing]
 
 
 def _bridged(rudder: Array, longest: int) -> Array:
