@@ -16,7 +16,7 @@ from host.live.align import AlignConfig, Aligner
 from host.recordings.outliers import CHANNELS, outliers, told
 from host.recordings.plane_readings import PlaneReadings
 from host.recordings.recording import NEEDED, Array, Recording, split_at_gaps
-from host.recordings.slow_depth import with_own_rows
+from host.recordings.slow_depth import SLOW, with_own_rows
 
 ONE_CHANNEL = 0.5  # of the rows that tell depth: at most so many tell pitch, too, where each has its own
 FEWEST = 10  # messages of either
@@ -50,8 +50,16 @@ class _Segment:
 
 
 def aligned(messages: Messages, config: AlignConfig, needs: tuple[str, ...] = NEEDED) -> list[Recording]:
-    """Stretches that have all that is needed; none where that never comes together."""
+    """Stretches that have all that is needed; none where that never comes together.
+
+    At the step of the grid, or that of a pitch that comes more seldom: between two of its messages there is
+    nothing to be learnt.
+    """
     messages = _without_spikes(messages)
+    if (usual := _usual_step(messages)) > SLOW * config.step:
+        config = AlignConfig(step=usual, rudder_on_change=config.rudder_on_change)
+        note = f"its pitch comes every {usual:.3g} s: taken at that step"
+        messages = replace(messages, notes=(*messages.notes, note))
     aligner = Aligner(config)
     segments: dict[int, _Segment] = {}
     for measurement in messages.measurements:
@@ -70,6 +78,12 @@ def aligned(messages: Messages, config: AlignConfig, needs: tuple[str, ...] = NE
             whole = with_own_rows(whole, *_sent(Quantity.DEPTH, messages, segment))
             pieces += split_at_gaps(whole, longest, needs)
     return pieces
+
+
+def _usual_step(messages: Messages) -> float:
+    """s, from one pitch to the next; 0 where hardly any comes."""
+    times = [one.t_us for one in messages.measurements if one.quantity is Quantity.PITCH]
+    return 1e-6 * float(np.median(np.diff(times))) if len(times) > FEWEST else 0.0
 
 
 def _without_spikes(messages: Messages) -> Messages:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bridge.measurement import Measurement, Quantity
@@ -79,3 +80,24 @@ def test_what_cannot_be_read_is_one_line(tmp_path: Path, name: str, says: str) -
     with pytest.raises(RecordingError, match=says) as caught:
         read_recordings(tmp_path / name, default_vehicle())
     assert "\n" not in str(caught.value)
+
+
+def test_a_log_whose_channels_come_seldom_is_taken_as_they_come(tmp_path: Path) -> None:
+    writer = Journal(tmp_path / "dive.jsonl", vehicle="v", configuration={}, wall_s=lambda: 1.7e9, warn=print)
+    periods = {Quantity.PITCH: 250_000, Quantity.DEPTH: 420_000, Quantity.RUDDER: 500_000}
+    sent = [
+        Measurement(quantity=quantity, value=1e-6 * t_us, t_us=t_us, source="x", boot=0)
+        for quantity, period in periods.items()
+        for t_us in range(0, 60_000_000, period)
+    ]
+    writer.measurements(sorted(sent, key=lambda one: one.t_us))
+    writer.close()
+    (recording,) = read_recordings(writer.path, default_vehicle())
+    assert recording.step == 0.25
+    assert recording.notes == ("its pitch comes every 0.25 s: taken at that step",)
+    for values, period in ((recording.pitch, 0.25), (recording.depth, 0.42)):
+        known = np.isfinite(values)
+        assert values[known] == pytest.approx(recording.time[known])
+        assert np.diff(recording.time[known]) == pytest.approx(period)
+    assert recording.plane is not None
+    assert recording.plane.time == pytest.approx(recording.plane.angle)
