@@ -49,14 +49,18 @@ def read_all(
     vehicle: Vehicle,
     say: Callable[[str], None],
     needs: tuple[str, ...] = ("depth", "pitch", "rudder"),
+    on_grid: bool = True,
 ) -> "list[Recording]":
-    """Every stretch of every file. Raises RecordingError when they do not belong together."""
+    """Every stretch of every file. Raises RecordingError when they do not belong together.
+
+    on_grid  as of host.recordings.read
+    """
     from host.recordings.read import read_recordings
 
     read: list[Recording] = []
     for path in paths:
         say(f"reading {path.name}")
-        read += read_recordings(path, vehicle, needs)
+        read += read_recordings(path, vehicle, needs, on_grid)
     with_speed = [recording.has_speed for recording in read]
     if any(with_speed) and not all(with_speed):
         lacking = read[with_speed.index(False)].name

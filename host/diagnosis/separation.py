@@ -268,7 +268,6 @@ def _blank(flown: Manoeuvre, like: Recording) -> Recording:
         rudder=flown.rudder,
         plane=None,
         plane_doubt=None,
-        own_rows=None,
         step=flown.step,
     )
 

@@ -20,7 +20,6 @@ from host.recordings.consistency import check_signs, units_note
 from host.recordings.outliers import without_outliers
 from host.recordings.plane_between_rows import ways_between
 from host.recordings.recording import Array, Recording
-from host.recordings.slow_depth import on_the_grid
 from host.vehicle import Vehicle
 
 Method = Literal["car", "mils", "robust", "ml"]
@@ -91,8 +90,6 @@ def identify(
     Raises RecordingError with one line where depth and pitch have opposite signs.
     """
     recordings, others = without_outliers(recordings), []
-    if method != "ml":
-        recordings = [on_the_grid(recording) for recording in recordings]
     check_signs(recordings)
     told = units_note(recordings)
     if method == "ml":

@@ -14,14 +14,15 @@ from bridge.measurement import Measurement, Quantity
 from firmware_model.sample import Sample
 from host.live.align import AlignConfig, Aligner
 from host.recordings.outliers import CHANNELS, outliers, told
+from host.recordings.own_times import Sent, at_own_times
 from host.recordings.plane_readings import PlaneReadings
 from host.recordings.recording import NEEDED, Array, Recording, split_at_gaps
-from host.recordings.slow_depth import SLOW, with_own_rows
 
 ONE_CHANNEL = 0.5  # of the rows that tell depth: at most so many tell pitch, too, where each has its own
 FEWEST = 10  # messages of either
 SAME_STEP = 0.1  # of the vehicle's step, by which a table's may differ
 SHORTEST = 1e-3  # s, of a step
+SLOW = 1.5  # steps, beyond which a pitch comes more seldom than the grid has instants
 BESIDE = 2_000_000  # us: a command sent so long before or after a segment still tells of it
 
 
@@ -49,7 +50,9 @@ class _Segment:
     samples: list[Sample] = field(default_factory=list)
 
 
-def aligned(messages: Messages, config: AlignConfig, needs: tuple[str, ...] = NEEDED) -> list[Recording]:
+def aligned(
+    messages: Messages, config: AlignConfig, needs: tuple[str, ...] = NEEDED, on_grid: bool = True
+) -> list[Recording]:
     """Stretches that have all that is needed; none where that never comes together.
 
     At the step of the grid, or that of a pitch that comes more seldom: between two of its messages there is
@@ -74,8 +77,11 @@ def aligned(messages: Messages, config: AlignConfig, needs: tuple[str, ...] = NE
     for segment in segments.values():
         if segment.samples:
             whole = _recording(messages, segment, config, counts)
+            heard = np.isfinite(whole.rudder)
             whole = replace(whole, rudder=_bridged(whole.rudder, round(longest / config.step)))
-            whole = with_own_rows(whole, *_sent(Quantity.DEPTH, messages, segment))
+            if not on_grid:
+                sent = {quantity.value: _sent(quantity, messages, segment) for quantity in Quantity}
+                whole = at_own_times(whole, sent, heard)
             pieces += split_at_gaps(whole, longest, needs)
     return pieces
 
@@ -121,7 +127,9 @@ def is_of_messages(table: Recording) -> bool:
     return bool(fewer >= FEWEST and (depth & pitch).sum() < ONE_CHANNEL * fewer)
 
 
-def aligned_table(table: Recording, config: AlignConfig, needs: tuple[str, ...] = NEEDED) -> list[Recording]:
+def aligned_table(
+    table: Recording, config: AlignConfig, needs: tuple[str, ...] = NEEDED, on_grid: bool = True
+) -> list[Recording]:
     """A table of messages on the grid: at the vehicle's step, if pitch comes so, else at that of pitch."""
     usual = float(np.median(np.diff(table.time[np.isfinite(table.pitch)])))
     if abs(usual - config.step) > SAME_STEP * config.step:
@@ -136,7 +144,7 @@ def aligned_table(table: Recording, config: AlignConfig, needs: tuple[str, ...] 
         has_angle=table.has_angle,
         starts_at_zero=True,
     )
-    return aligned(messages, config, needs)
+    return aligned(messages, config, needs, on_grid)
 
 
 def _measurements(table: Recording) -> Iterable[Measurement]:
@@ -179,7 +187,7 @@ def _plane(messages: Messages, segment: _Segment, step: float) -> PlaneReadings 
     return plane if plane.is_slow else None
 
 
-def _sent(quantity: Quantity, messages: Messages, segment: _Segment) -> tuple[Array, Array]:
+def _sent(quantity: Quantity, messages: Messages, segment: _Segment) -> Sent:
     """Times s, on the recording's axis, and values of a channel's messages about a segment, as they come."""
     first, last = segment.samples[0].t_us, segment.samples[-1].t_us
     begins = 0 if messages.starts_at_zero else first
@@ -192,7 +200,7 @@ def _sent(quantity: Quantity, messages: Messages, segment: _Segment) -> tuple[Ar
     ]
     time, values = np.array(sent).reshape(-1, 2).T
     advancing = np.diff(np.maximum.accumulate(time), prepend=-np.inf) > 0.0
-    return time[advancing], values[advancing]
+    return Sent(time[advancing], values[advancing])
 
 
 def _bridged(rudder: Array, longest: int) -> Array:

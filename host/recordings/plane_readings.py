@@ -21,6 +21,23 @@ STEPPING = 0.3  # of the readings that repeat the one before
 JUMP = 5.0  # times as fast as just before and just after: no swing
 
 
+def step_means(time: Array, levels: Array, begins: Array, ends: Array) -> Array:
+    """Means (N,) from `begins` to `ends` of what steps at each of `time` (J,) from levels[0] to levels[J].
+
+    Of J levels the first stands before the first step, too.
+    """
+    levels = levels if levels.size > time.size else np.append(levels[:1], levels)
+    areas = np.append(0.0, np.cumsum(levels[1:-1] * np.diff(time)))
+
+    def area(t: Array) -> Array:
+        """Under the steps, from the first of them on."""
+        passed = np.searchsorted(time, t, side="right")
+        last = np.maximum(passed - 1, 0)
+        return np.asarray(areas[last] + levels[passed] * (t - time[last]))
+
+    return np.asarray((area(ends) - area(begins)) / (ends - begins))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PlaneReadings:
     """Readings of a plane that was not read in every row.
@@ -92,18 +109,10 @@ class PlaneReadings:
         gaps, at, jumps = np.diff(self.time), np.ones(self.time.size - 1), self._jumps()
         at[self.steps] = self.mean_moments if moments is None else moments
         jumped, moved = self.time[:-1] + at * gaps, np.append(0.0, np.cumsum(jumps))
-        areas = np.append(0.0, np.cumsum(moved[1:-1] * np.diff(jumped)))
-
-        def area(t: Array) -> Array:
-            """Under the steps, from the first of them on."""
-            passed = np.searchsorted(jumped, t, side="right")
-            since = t - jumped[np.maximum(passed - 1, 0)]
-            return np.asarray(areas[np.maximum(passed - 1, 0)] + moved[passed] * since)
-
         swing = Akima1DInterpolator(self.time, self.angle - moved)
         late = self.pace / 2.0 if holds_between else 0.0
         early, middle, end = (
             swing(np.clip(t - late, self.time[0], self.time[-1]))
             for t in (begins, (begins + ends) / 2.0, ends)
         )
-        return np.asarray((area(ends) - area(begins)) / (ends - begins) + (early + 4.0 * middle + end) / 6.0)
+        return np.asarray(step_means(jumped, moved, begins, ends) + (early + 4.0 * middle + end) / 6.0)

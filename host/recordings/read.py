@@ -12,10 +12,14 @@ from host.recordings.recording import NEEDED, Recording, file_sha256
 from host.vehicle import Vehicle
 
 
-def read_recordings(path: Path, vehicle: Vehicle, needs: tuple[str, ...] = NEEDED) -> list[Recording]:
+def read_recordings(
+    path: Path, vehicle: Vehicle, needs: tuple[str, ...] = NEEDED, on_grid: bool = True
+) -> list[Recording]:
     """Stretches of one file, cut at reboots and long gaps; `counts` of each say what was refused and why.
 
     needs  channels without which a stretch is of no use; the others may be missing altogether.
+    on_grid  whether messages are brought to the instants of a grid, as methods that are fed at every step
+             need them, or stand at their own times (host.recordings.own_times)
 
     Raises RecordingError or LogFormatError with one line when nothing usable is in it.
     """
@@ -27,7 +31,7 @@ def read_recordings(path: Path, vehicle: Vehicle, needs: tuple[str, ...] = NEEDE
         raise RecordingError(f"{path}: is empty; nothing was recorded")
     suffix = path.suffix.lower()
     if suffix == ".csv":
-        return _of_table(path, vehicle, needs)
+        return _of_table(path, vehicle, needs, on_grid)
     is_journal = suffix == ".jsonl"
     reading = read_journal(path) if is_journal else read_log(path, vehicle.mavlink, vehicle.can)
     messages = Messages(
@@ -38,12 +42,12 @@ def read_recordings(path: Path, vehicle: Vehicle, needs: tuple[str, ...] = NEEDE
         notes=tuple(reading.notes),
         alarms=_alarms(reading),
     )
-    return aligned(messages, vehicle.alignment, needs) or _refused(path, reading, needs)
+    return aligned(messages, vehicle.alignment, needs, on_grid) or _refused(path, reading, needs)
 
 
-def _of_table(path: Path, vehicle: Vehicle, needs: tuple[str, ...]) -> list[Recording]:
+def _of_table(path: Path, vehicle: Vehicle, needs: tuple[str, ...], on_grid: bool) -> list[Recording]:
     table = read_table(path, vehicle.csv, needs)
-    pieces = aligned_table(table, vehicle.alignment, needs) if is_of_messages(table) else []
+    pieces = aligned_table(table, vehicle.alignment, needs, on_grid) if is_of_messages(table) else []
     return pieces or stretches_of(table, path, needs)
 
 

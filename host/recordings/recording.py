@@ -33,7 +33,6 @@ class Recording:
     plane       its readings, where these are further apart than the rows
     plane_doubt  rad and m (J, 2, N): what pitch and depth do where one of J moments at which the plane
                 stepped between its readings is off by a deviation; None where all of them are known
-    own_rows    whether a row was added for a reading of depth alone (host.recordings.slow_depth)
     counts      what was refused in the whole file, by cause
     notes       what was lost or decided on the user's behalf, one sentence each
     alarms      s, on the axis of time: when the vehicle was found to move no longer as it did
@@ -52,7 +51,6 @@ class Recording:
     has_moving_plane: bool = False
     plane: PlaneReadings | None = None
     plane_doubt: Array | None = None
-    own_rows: NDArray[np.bool_] | None = None
     counts: Counter[str] = field(default_factory=Counter)
     notes: tuple[str, ...] = ()
     alarms: tuple[float, ...] = ()
@@ -82,7 +80,6 @@ class Recording:
             rudder=self.rudder[rows],
             speed=self.speed[rows],
             pitch_rate=self.pitch_rate[rows],
-            own_rows=None if self.own_rows is None else self.own_rows[rows],
             plane_doubt=None if self.plane_doubt is None else self.plane_doubt[:, :, rows],
             alarms=tuple(alarm for alarm in self.alarms if start <= alarm < end),
         )
@@ -120,7 +117,6 @@ def split_at_gaps(
                 name: getattr(filled, name)[of_piece]
                 for name in ("time", "depth", "pitch", "rudder", "speed", "pitch_rate")
             },
-            own_rows=None if filled.own_rows is None else filled.own_rows[of_piece],
         )
         if of_piece.sum() >= 10 and all(np.isfinite(getattr(piece, name)).any() for name in needs):
             pieces.append(_with_useful_speed(piece))

@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     leave_out = spans_in(args.leave_out)
     model = read_model(args.model) if args.model is not None else None
     with progress(args.quiet) as say:
-        dives = without(under_water(read_all(args.recordings, vehicle, say)), leave_out)
+        dives = without(under_water(read_all(args.recordings, vehicle, say, on_grid=False)), leave_out)
         recordings = _part(dives, args)
         from host.catalogue import named
         from host.diagnosis.against.given_model import against_model

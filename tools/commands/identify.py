@@ -47,7 +47,8 @@ def run(args: argparse.Namespace) -> int:
     vehicle, leave_out = load_vehicle(args.vehicle), spans_in(args.leave_out)
     worst = 0
     with progress(args.quiet) as say:
-        read = without(under_water(read_all(args.recordings, vehicle, say)), leave_out)
+        on_grid = args.method != "ml"
+        read = without(under_water(read_all(args.recordings, vehicle, say, on_grid=on_grid)), leave_out)
         for recordings, folder in joint_or_each(read, args.out, args.each):
             result = identify(recordings, vehicle, args.method, say)
             folder.mkdir(parents=True, exist_ok=True)
