@@ -18,7 +18,9 @@ CHANNELS = {"depth": "depth", "pitch": "pitch", "speed": "speed", "pitch_rate": 
 FEWEST = 20  # readings that tell how a channel came into the table
 COARSE = 2.0  # times the least difference of two readings: what usually differs by less is only rounded
 ROUNDED = 2.5  # steps of the last digit, by which rows on a line may be off it
+SHARPLY, OFTEN = 1e-3, 0.95  # of the bend that so many rows keep below: less is how numbers are written
 BENDS = 4.0  # times that, by which a line usually bends at a reading
+SLIP = 0.1  # of a row, by which a clock may be off
 STRAIGHT, REGULAR = 0.3, 0.8  # shares of rows on a line, and of readings that come at their usual distance
 
 
@@ -29,7 +31,7 @@ def readings_alone(recording: Recording) -> Recording:
     for name, words in CHANNELS.items():
         column = getattr(recording, name)
         for find, done in ((repeats, "repeats the last reading"), (between, "is on a line between readings")):
-            if (rows := find(column)) is not None:
+            if (rows := find(recording.time, column)) is not None:
                 values[name] = np.where(rows, np.nan, column)
                 share = rows.sum() / np.isfinite(column).sum()
                 notes.append(f"{words} {done} in {100 * share:.0f} % of the rows: these are not measurements")
@@ -37,7 +39,7 @@ def readings_alone(recording: Recording) -> Recording:
     return replace(recording, **values, notes=(*recording.notes, *notes)) if values else recording
 
 
-def repeats(values: Array) -> NDArray[np.bool_] | None:
+def repeats(time: Array, values: Array) -> NDArray[np.bool_] | None:
     """Rows (N,) that repeat the reading before; None where a channel is not told in that way.
 
     A reading that stands for longer than usual was made again. A coarsely rounded channel repeats as well,
@@ -48,16 +50,17 @@ def repeats(values: Array) -> NDArray[np.bool_] | None:
     begins = np.flatnonzero(is_new)
     if begins.size < FEWEST:
         return None
-    usual = int(np.median(np.diff(begins)))
     moves = np.abs(np.diff(values[rows][begins]))
-    if usual < 2 or np.median(moves) <= COARSE * moves.min():
+    if np.median(np.diff(begins)) < 2 or np.median(moves) <= COARSE * moves.min():
         return None
-    place = np.arange(rows.size)
-    since = place - np.maximum.accumulate(np.where(is_new, place, 0))
-    return _marked(values.size, rows[since % usual != 0])
+    told, place = time[rows], np.arange(rows.size)
+    usual = float(np.median(np.diff(told[begins])))
+    since = told - told[np.maximum.accumulate(np.where(is_new, place, 0))]
+    again = np.floor((since + SLIP * float(np.median(np.diff(told)))) / usual)
+    return _marked(values.size, rows[~is_new & (np.diff(again, prepend=0.0) <= 0.0)])
 
 
-def between(values: Array) -> NDArray[np.bool_] | None:
+def between(time: Array, values: Array) -> NDArray[np.bool_] | None:
     """Rows (N,) on straight lines between two readings; None where a channel is not told in that way.
 
     The readings are where the lines bend, or next to there, and come as evenly as a sensor's do.
@@ -65,8 +68,10 @@ def between(values: Array) -> NDArray[np.bool_] | None:
     rows = np.flatnonzero(np.isfinite(values))
     if rows.size < FEWEST:
         return None
-    bend = np.abs(np.diff(values[rows], 2))
-    rounding = max(ROUNDED * lattice([values]), 1e-9)
+    told = time[rows]
+    pace = float(np.median(np.diff(told)))
+    bend = np.abs(np.diff(np.diff(values[rows]) / np.diff(told))) * pace
+    rounding = max(ROUNDED * lattice([values]), SHARPLY * float(np.quantile(bend, OFTEN)), 1e-9)
     corners = 1 + np.flatnonzero(bend > rounding)
     if corners.size > (1.0 - STRAIGHT) * bend.size:
         return None
@@ -75,10 +80,10 @@ def between(values: Array) -> NDArray[np.bool_] | None:
     readings = corners[first]
     if readings.size < FEWEST:
         return None
-    apart = np.diff(readings)
+    apart = np.diff(told[readings]) / pace
     usual = np.median(apart)
-    is_regular = np.mean(np.abs(apart - usual) <= 1) >= REGULAR
-    if usual < 2 or not is_regular or np.median(bend[corners - 1]) < BENDS * rounding:
+    is_regular = np.mean(np.abs(apart - usual) <= 1.0 + SLIP) >= REGULAR
+    if usual < 2.0 - SLIP or not is_regular or np.median(bend[corners - 1]) < BENDS * rounding:
         return None
     kept = np.concatenate([[0], readings, [rows.size - 1]])
     return _marked(values.size, np.delete(rows, kept))

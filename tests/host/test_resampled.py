@@ -1,5 +1,6 @@
 """Rows that fill the time between two readings are no readings."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 from host.recordings.csv_map import CsvMap
 from host.recordings.csv_recording import read_csv_recording
 from host.recordings.resampled import between, repeats
+
+Find = Callable[[np.ndarray, np.ndarray], np.ndarray | None]
 
 
 def dive(rows: int = 2000, noise: float = 0.008) -> np.ndarray:
@@ -21,18 +24,34 @@ def dive(rows: int = 2000, noise: float = 0.008) -> np.ndarray:
 def test_held_readings_count_once_each_when_it_came(every: int, digits: int) -> None:
     depth = np.round(dive(), digits)
     held = depth[np.arange(depth.size) // every * every]
-    rows = repeats(held)
+    rows = repeats(0.1 * np.arange(held.size), held)
     assert rows is not None
     new = np.diff(held, prepend=np.nan) != 0.0
     assert not rows[new].any()
     assert rows.mean() == pytest.approx(1.0 - 1.0 / every, abs=0.01)
 
 
+@pytest.mark.parametrize("find", [repeats, between])
+def test_readings_are_found_although_rows_were_lost(find: Find) -> None:
+    depth, at = dive(), np.arange(2000)
+    kept = np.random.default_rng(3).random(at.size) > 0.12
+    read = kept & (at % 6 == 0)
+    if find is repeats:
+        filled = depth[np.maximum.accumulate(np.where(read, at, 0))]
+    else:
+        filled = np.interp(at, at[read], depth[read])
+    written = np.array([float(f"{value:.9g}") for value in filled])
+    rows = find(0.1 * at[kept], written[kept])
+    assert rows is not None
+    assert (~rows[read[kept]]).mean() > 0.95
+    assert (~rows).sum() == pytest.approx(read.sum(), rel=0.15)
+
+
 @pytest.mark.parametrize("every", [2, 3, 10])
 def test_rows_on_a_line_between_readings_are_found(every: int) -> None:
     depth, at = dive(), np.arange(2000)
     drawn = np.round(np.interp(at, at[::every], depth[::every]), 5)
-    rows = between(drawn)
+    rows = between(0.1 * np.arange(drawn.size), drawn)
     assert rows is not None
     assert rows.mean() == pytest.approx(1.0 - 1.0 / every, abs=0.03)
     kept = ~rows
@@ -42,7 +61,7 @@ def test_rows_on_a_line_between_readings_are_found(every: int) -> None:
 def test_readings_between_two_rows_leave_one_row_each() -> None:
     depth, at = dive(), np.arange(2000.0)
     drawn = np.interp(at, at[2::5] + 0.37, depth[2::5])
-    rows = between(drawn)
+    rows = between(0.1 * np.arange(drawn.size), drawn)
     assert rows is not None
     assert (~rows).sum() == pytest.approx(400, abs=3)
 
@@ -51,20 +70,20 @@ def test_readings_between_two_rows_leave_one_row_each() -> None:
 @pytest.mark.parametrize("noise", [0.0, 0.008, 0.05])
 def test_what_a_sensor_says_every_row_is_left_alone(digits: int, noise: float) -> None:
     depth = np.round(dive(noise=noise), digits)
-    assert repeats(depth) is None
-    assert between(depth) is None
+    assert repeats(0.1 * np.arange(depth.size), depth) is None
+    assert between(0.1 * np.arange(depth.size), depth) is None
 
 
 def test_a_vehicle_that_rests_for_long_is_no_held_reading() -> None:
     depth = np.concatenate([np.full(1500, 20.0), dive(500)])
-    assert repeats(depth) is None
-    assert between(depth) is None
+    assert repeats(0.1 * np.arange(depth.size), depth) is None
+    assert between(0.1 * np.arange(depth.size), depth) is None
 
 
 def test_a_reading_that_stands_longer_than_usual_was_made_again() -> None:
     depth = dive()[np.arange(2000) // 5 * 5]
     depth[1000:1100] = depth[1000]
-    rows = repeats(depth)
+    rows = repeats(0.1 * np.arange(depth.size), depth)
     assert rows is not None
     assert (~rows)[1000:1100].sum() == 20
 
