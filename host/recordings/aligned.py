@@ -21,7 +21,7 @@ from host.recordings.recording import NEEDED, Array, Recording, split_at_gaps
 ONE_CHANNEL = 0.5  # of the rows that tell depth: at most so many tell pitch, too, where each has its own
 FEWEST = 10  # messages of either
 SAME_STEP = 0.1  # of the vehicle's step, by which a table's may differ
-SHORTEST = 1e-3  # s, of a step
+SHORTEST, LONGEST = 1e-3, 30.0  # s, of a step that shows any motion
 SLOW = 1.5  # steps, beyond which a pitch comes more seldom than the grid has instants
 BESIDE = 2_000_000  # us: a command sent so long before or after a segment still tells of it
 
@@ -59,7 +59,7 @@ def aligned(
     nothing to be learnt.
     """
     messages = _without_spikes(messages)
-    if (usual := _usual_step(messages)) > SLOW * config.step:
+    if SLOW * config.step < (usual := _usual_step(messages)) <= LONGEST:
         config = AlignConfig(step=usual, rudder_on_change=config.rudder_on_change)
         note = f"its pitch comes every {usual:.3g} s: taken at that step"
         messages = replace(messages, notes=(*messages.notes, note))
