@@ -9,9 +9,9 @@ vehicle did, with all that every vehicle has: about a run of that model the resi
 with the sensitivities S to its coefficients p and to the start, and a normal prior of the mean and variance
 that f_j has anywhere between the readings. What the recordings tell of the moments costs log det(1 + B^T B V)
 of BIC, twice the logarithm by which the posterior is narrower than the prior of variances V; if all steps are
-where the rows of a table were, it costs which row each was at. Of the steps
-that are estimated so the recordings are handed on with what another moment would do, B V^(1/2), which counts
-for nothing from then on (host.noise.unseen_plane): the model they were estimated with is none of the answer.
+where the rows of a table were, it costs which row each was at. The recordings are handed on with what another
+moment of each step would do, B V^(1/2), which counts for nothing from then on (host.noise.unseen_plane): the
+model the moments were estimated with is none of the answer.
 """
 
 from collections.abc import Callable
@@ -151,6 +151,8 @@ def _likeliest(unseen: UnseenSteps, moved: Moved) -> Aim:
     normal, rhs = np.zeros((p + count, p + count)), np.zeros(p + count)
     weight = 1.0 / np.sqrt(fit.noise[:2])
     for error, slopes, shifts in _residuals(unseen, moved):
+        if not (np.isfinite(slopes).all() and np.isfinite(shifts).all()):
+            return Aim(moved.moments, fit.parameters, 0.0)  # it has run away: no step leads anywhere
         columns = np.concatenate([slopes[:, : fit.free.size][:, fit.free], shifts], axis=1)
         flat = (columns * weight[:, None, None]).transpose(1, 0, 2).reshape(p + count, -1)
         start = (slopes[:, -NX0:] * weight[:, None, None]).transpose(1, 0, 2).reshape(NX0, -1)

@@ -34,11 +34,11 @@ def at_own_times(grid: Recording, sent: dict[str, Sent], is_heard: NDArray[np.bo
     """
     kept = {name: _nearest(grid, sent[name]) for name in ("pitch", "depth")}
     time = _rows(kept["pitch"].time, kept["depth"].time, SAME_ROW * grid.step)
-    if time.size == 0:
+    plane = sent["rudder"]
+    if time.size == 0 or plane.time.size == 0:
         return grid
     ends = np.append(time[1:], time[-1] + grid.step)
     step = np.clip(np.searchsorted(grid.time, time, side="right") - 1, 0, grid.time.size - 1)
-    plane = sent["rudder"]
     rudder = np.where(is_heard[step], step_means(plane.time, plane.value, time, ends), grid.rudder[step])
     columns: dict[str, Any] = {name: _placed(time, one, grid.step) for name, one in kept.items()}
     for name in ("speed", "pitch_rate"):

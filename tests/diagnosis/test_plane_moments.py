@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hidden_dive import hidden_dive
 
+from host.diagnosis import plane_moments
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.plane_moments import with_plane_moments
 from host.diagnosis.recordings.spans import divide
@@ -54,6 +55,17 @@ def test_a_plane_that_is_told_when_it_is_read_holds_until_then() -> None:
     told = split_at_gaps(finer, 1.0)
     assert UnseenSteps(told).steps
     assert with_plane_moments(told) is told
+
+
+def test_where_the_vehicle_runs_away_no_step_leads_anywhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = [read_every(hidden_dive(duration=40.0), 5)]
+    nothing = [(np.zeros((2, 3)), np.full((2, 40, 3), np.inf), np.full((2, 9, 3), np.nan))]
+    monkeypatch.setattr(plane_moments, "_residuals", lambda *_: nothing)
+    unseen = UnseenSteps(seen)
+    moved = plane_moments._anew(unseen, unseen.mean)
+    aim = plane_moments._likeliest(unseen, moved)
+    assert aim.moments is moved.moments
+    assert aim.charge == 0.0
 
 
 def test_stretches_have_their_part_of_the_doubt() -> None:

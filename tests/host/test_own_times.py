@@ -78,6 +78,13 @@ def test_the_plane_is_at_its_mean_over_each_row_but_where_it_was_not_heard() -> 
     assert not own.rudder[:-1][~known].any()
 
 
+def test_without_a_plane_or_a_reading_it_stays_on_the_grid() -> None:
+    none, own = np.zeros(0), grid()
+    assert at_own_times(own, sent(GRID, GRID, none), HEARD) is own
+    assert at_own_times(own, sent(none, none, GRID), HEARD) is own
+    assert at_own_times(own, sent(none, GRID, GRID[:1]), HEARD).depth == pytest.approx(GRID)
+
+
 def test_the_noise_of_a_depth_between_the_instants_is_that_of_its_sensor(tmp_path: Path) -> None:
     path, rng = write(tmp_path / "dive.csv"), np.random.default_rng(1)
     header, *rows = path.read_text().splitlines()
