@@ -34,8 +34,8 @@ class UnseenPlane:
     def whitened(self, values: Array) -> Array:
         """Residuals (2, N) or sensitivities (2, c, N), 0 where nothing was measured, whitened."""
         scale = self.weight.reshape(2, *[1] * (values.ndim - 1))
-        flat = np.moveaxis(values * scale, 0, -2).reshape(-1, self.basis.shape[1])
         with np.errstate(invalid="ignore", over="ignore"):  # what has run away
+            flat = np.moveaxis(values * scale, 0, -2).reshape(-1, self.basis.shape[1])
             flat = flat - ((flat @ self.basis.T) * self.less) @ self.basis
         shape = (*values.shape[1:-1], 2, values.shape[-1])
         return np.asarray(np.moveaxis(flat.reshape(shape), -2, 0) / scale)

@@ -44,6 +44,12 @@ def test_sensitivities_are_whitened_one_by_one(doubt: np.ndarray, present: np.nd
         assert whitening.whitened(slopes)[:, k] == pytest.approx(whitening.whitened(slopes[:, k]))
 
 
+def test_what_has_run_away_warns_of_nothing(doubt: np.ndarray, present: np.ndarray) -> None:
+    whitening = unseen_plane(doubt, present, NOISE)
+    assert whitening is not None
+    assert not np.isfinite(whitening.whitened(np.full((2, N), 1e308) * present)).all()
+
+
 def test_without_doubt_or_where_it_is_not_seen_there_is_none(doubt: np.ndarray, present: np.ndarray) -> None:
     assert unseen_plane(None, present, NOISE) is None
     assert unseen_plane(1e-3 * doubt, present, NOISE) is None
