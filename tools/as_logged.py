@@ -7,14 +7,13 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
 from tools.sitl.recording import COLUMNS, write_csv
 from tools.trial.logger import Fill, Logger
 from tools.trial.recorded import read_recorded
-
-FILLS: dict[str, Fill] = {"empty": "empty", "last": "last", "line": "line"}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -27,7 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.add_argument(
             f"--{name}", dest=column, type=int, default=1, metavar="N", help=f"{name} in every N-th row only"
         )
-    parser.add_argument("--fill", choices=FILLS, default="empty", help="what stands in the others")
+    parser.add_argument("--fill", choices=get_args(Fill), default="empty", help="what stands in the others")
     parser.add_argument("--lost", type=float, default=0.0, metavar="SHARE", help="of all rows")
     parser.add_argument(
         "--time-step", type=float, default=0.0, metavar="S", help="to which times are rounded"
@@ -42,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"{args.source}: is no table of numbers ({error})")
     if "time_s" not in table:
         parser.error(f"{args.source}: has no column time_s")
-    logger = Logger(every=every, fill=FILLS[args.fill], lost=args.lost, time_step=args.time_step)
+    logger = Logger(every=every, fill=args.fill, lost=args.lost, time_step=args.time_step)
     kept = logger.kept(table)
     write_csv(args.target, kept)
     read = {name: int(np.isfinite(column).sum()) for name, column in kept.items() if name != "time_s"}

@@ -100,11 +100,12 @@ def with_plane_moments(
 def _whole(recordings: list[Recording]) -> tuple[Fitter, Explanation]:
     """All that every vehicle has, fitted to all of the recordings."""
     runs = runs_of(recordings)
-    first = Fitter(excerpt(runs))
+    part = excerpt(runs)
+    first = Fitter(part)
     names = frozenset({FREE_TRIM.name, *ORDINARY, *FAINT})
     names |= {*first.tools_beside(names)}
     found = ended(first, begun_from(first, first.root, names), names)
-    if len(first.recordings) == len(runs):
+    if part is runs:
         return first, found
     fitter = Fitter(runs, known=found)
     return fitter, fitter.refitted(found)

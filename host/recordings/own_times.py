@@ -39,7 +39,8 @@ def at_own_times(grid: Recording, sent: dict[str, Sent], is_heard: NDArray[np.bo
         return grid
     ends = np.append(time[1:], time[-1] + grid.step)
     step = np.clip(np.searchsorted(grid.time, time, side="right") - 1, 0, grid.time.size - 1)
-    rudder = np.where(is_heard[step], step_means(plane.time, plane.value, time, ends), grid.rudder[step])
+    angles = np.append(plane.value[:1], plane.value)  # the first stood before it was sent
+    rudder = np.where(is_heard[step], step_means(plane.time, angles, time, ends), grid.rudder[step])
     columns: dict[str, Any] = {name: _placed(time, one, grid.step) for name, one in kept.items()}
     for name in ("speed", "pitch_rate"):
         columns[name] = _placed(time, _nearest(grid, sent[name]), grid.step)

@@ -22,11 +22,7 @@ JUMP = 5.0  # times as fast as just before and just after: no swing
 
 
 def step_means(time: Array, levels: Array, begins: Array, ends: Array) -> Array:
-    """Means (N,) from `begins` to `ends` of what steps at each of `time` (J,) from levels[0] to levels[J].
-
-    Of J levels the first stands before the first step, too.
-    """
-    levels = levels if levels.size > time.size else np.append(levels[:1], levels)
+    """Means (N,) from `begins` to `ends` of what steps at each of `time` (J,) through `levels` (J + 1,)."""
     areas = np.append(0.0, np.cumsum(levels[1:-1] * np.diff(time)))
 
     def area(t: Array) -> Array:

@@ -1,6 +1,8 @@
 """When a plane stepped that was read in few of the rows."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from host.diagnosis.recordings.spans import divide
 from host.diagnosis.recordings.unseen_steps import UnseenSteps
 from host.recordings.plane_in_table import plane_readings
 from host.recordings.recording import Array, Recording, split_at_gaps
+from tools.cli import main
 
 
 def read_every(dive: Recording, rows: int) -> Recording:
@@ -90,6 +93,24 @@ def test_drag_is_named_although_the_plane_was_hardly_read(rows: int) -> None:
     assert [effect.name for effect in found.effects] == ["heave_quadratic_drag"]
     value, std, _ = found.effects[0].coefficients["c_ww"]
     assert value == pytest.approx(-1.5, abs=3.0 * std)
+
+
+@pytest.mark.long
+def test_drag_is_named_from_messages_that_come_seldom(tmp_path: Path) -> None:
+    sparse = tmp_path / "sparse.csv"
+    words = ["--scenario", "sparse_telemetry", "--link", "none", "--speed", "100000", "--quiet"]
+    assert main(["sitl", *words, "--record", str(sparse)]) == 0
+    assert main(["diagnose", str(sparse), "--out", str(tmp_path / "out"), "--jobs", "1", "--quiet"]) == 0
+    found = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert found["verdict"] == "explained"
+    assert [effect["name"] for effect in found["effects"]] == ["heave_quadratic_drag"]
+
+
+def test_of_long_recordings_all_is_moved_though_an_excerpt_begins(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plane_moments, "excerpt", lambda runs: [runs[0].between(0.0, 30.0)])
+    (moved,) = with_plane_moments([read_every(hidden_dive(), 5)])
+    assert moved.plane_doubt is not None
+    assert (np.abs(moved.plane_doubt[:, :, moved.time > 60.0]) > 0.0).any()
 
 
 @pytest.mark.long

@@ -24,7 +24,15 @@ def test_shipped_scenario_loads_under_its_own_name(name):
 
 
 def test_shipped_scenarios_are_the_documented_ones():
-    assert SHIPPED == ["calm_sea", "default", "fin_damage", "fin_lost", "linear_noise_free", "rough_sea"]
+    assert SHIPPED == [
+        "calm_sea",
+        "default",
+        "fin_damage",
+        "fin_lost",
+        "linear_noise_free",
+        "rough_sea",
+        "sparse_telemetry",
+    ]
 
 
 def test_realistic_flavour_is_a_start_that_the_file_may_change():

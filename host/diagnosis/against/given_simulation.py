@@ -97,12 +97,7 @@ def check_same_flight(recordings: list[Recording], simulated: list[Recording]) -
 def _as_steered(diagnosed: Diagnosis, recordings: list[Recording]) -> list[Recording]:
     """With what the plane was found to do between their rows."""
     return [
-        replace(
-            one,
-            rudder=each.rudder,
-            has_moving_plane=each.has_moving_plane,
-            plane_doubt=each.plane_doubt,
-        )
+        replace(one, rudder=each.rudder, has_moving_plane=each.has_moving_plane)
         for one, each in zip(recordings, diagnosed.recordings, strict=True)
     ]
 
