@@ -20,7 +20,8 @@ from firmware_model.estimator import make_estimator
 from firmware_model.sample import Sample
 from host.diagnosis.recordings.around import LONGEST_SIDE, around_alarm
 from host.live.mismatch import Mismatch, MismatchConfig, MismatchWatch
-from host.live.prediction_window import Array, PredictionWindow, Reference
+from host.live.prediction_window import PredictionWindow
+from host.live.reference import Array, Reference
 from host.recordings.recording import Recording
 from tools.sitl.effects import Timed
 from tools.sitl.excitation import Excitation
@@ -133,7 +134,7 @@ def errors(dive: Dive, window: PredictionWindow, reference: Reference, seconds: 
     for k in range(round(seconds / STEP)):
         window.push(dive.sample())
         if k % 10 == 9 and k >= 50 and window.is_full:
-            found.append(window.compare(reference, LEVELS).errors)
+            found.append(window.errors(reference, LEVELS))
     rms: Array = np.sqrt(np.mean(np.square(found), axis=0))
     return rms
 
@@ -185,7 +186,7 @@ def strike(name: str, seed: int, records: bool = False) -> Iterator[Strike]:
         window.push(sample)
         reference = crew.watch.reference
         if reference is not None and k % 10 == 0 and k > 0.5 * ONSET / STEP and window.is_full:
-            found.append(window.compare(reference, LEVELS).errors)
+            found.append(window.errors(reference, LEVELS))
     reference = crew.watch.reference
     if reference is None or not found:
         raise SystemExit(f"{name} {seed}: nothing was learnt before the fault")

@@ -1,9 +1,11 @@
 """Says when the vehicle no longer moves as it was known to: the live alarm.
 
-Once a second a reference model runs freely over the last seconds (`host.live.prediction_window`). What it
-misses is judged by what the same model missed before, while the vehicle moved at least as much: a rough sea,
-a nonlinear hull and a noisy sensor set their own level, and only a change of that level tells. An alarm is a
-mean of normalised deviations, over some windows in a row, that is longer than a threshold.
+A reference model foretells the vehicle in two ways. A filter that follows it leaves innovations; freed of the
+spectrum that waves and noise have given them so far, they speak for or against each simple change since each
+of some moments (`host.live.evidence`). And once a second the reference runs freely over the last seconds
+(`host.live.prediction_window`). Both are judged by what was usual while the vehicle moved at least as much: a
+rough sea, a nonlinear hull and a noisy sensor set their own level. An alarm is evidence well beyond the
+strongest that was usual, or a free run that misses by twice the worst of it for many seconds.
 
 The reference is a snapshot of the live estimate, one to two minutes old and kept while anything looks
 suspicious, so that what the estimator learns of a fault cannot hide it.
@@ -18,17 +20,12 @@ import numpy as np
 from firmware_model.config import EstimatorConfig
 from firmware_model.estimate import Estimate
 from firmware_model.sample import Sample
-from host.live.prediction_history import Past, PredictionHistory
-from host.live.prediction_window import (
-    CHANGES,
-    NAMES,
-    Array,
-    Comparison,
-    PredictionWindow,
-    Reference,
-    read_reference,
-    reference_of,
-)
+from host.live.evidence import evidence_of
+from host.live.innovations import CHANGES, NAMES, Innovations
+from host.live.prediction_history import HELD_BACK, SMALLEST, Comparison, Past, PredictionHistory
+from host.live.prediction_window import PredictionWindow
+from host.live.reference import Array, Reference, read_reference, reference_of
+from host.live.whitening import ORDER, Whitening
 
 SLOTS = ("none", "heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment", "unknown")
 """Slots by the number under which they are published."""
@@ -41,14 +38,18 @@ SENTENCES = {
     "unknown": "no single change explains it (rougher water, or several changes)",
 }
 
+BLOCKS = 20  # of innovations, in a horizon
+MOMENTS = [80, 60, 40, 30, 20, 15, 10]  # blocks ago, since when a change may have been
+IN_A_ROW = 2  # windows whose evidence is averaged
+LEAST_RATIO = 1.4  # of the prediction error to the usual, without which evidence is no alarm
+SEEN_IN = 10  # windows, in one of which it must have been
 LEVEL_WINDOWS = 60  # windows that set the units in which a channel's errors count
-SUSPICIOUS = 0.5  # of the threshold: from here on the reference is kept as it is
-NO_WORSE = 1.2  # ratio of prediction errors up to which a new snapshot is as good as the reference
-LONGEST_WAIT = 10  # windows for which an alarm that still grows waits: the moment of the change misleads
+SUSPICIOUS = 0.7  # of what is an alarm: from here on the reference is kept as it is
+BETTER = 0.9  # ratio of prediction errors below which a new snapshot takes the place of the reference
+LONGEST_WAIT = 5  # windows for which an alarm that still grows waits: the moment of the change misleads
 LARGEST_RATIO = 655.0  # that is sent
-EXPLAINED = 0.2  # share of the excess error that a change must explain to be named
+EXPLAINED = 0.2  # share of the innovations' excess that a change must explain to be named
 AS_GOOD = 0.85  # of what the best change explains: one of another slot that explains more is as good
-NAMING = 4  # windows, the last ones, that name the slot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,10 +62,10 @@ class MismatchConfig:
     )
     horizon: float | None = None  # s, > 0: length of a free run; default 10 T (10 s)
     period: float | None = None  # s, > 0: between two free runs; default a tenth of the horizon
-    persistence: int = 20  # free runs, 1 to 100, over which the deviation is averaged
-    threshold: float = 3.5  # > 0: length of the mean deviation that is an alarm, in spreads of the past
+    persistence: int = 20  # free runs, 1 to 100, over which their errors are averaged
+    threshold: float = 1.45  # > 0: evidence that is an alarm, by the strongest that is usual
     memory: float = 1800.0  # s, > 0: past that sets the level
-    settling: float = 240.0  # s, >= 0: past without which nothing is judged, also after an alarm
+    settling: float = 120.0  # s, >= 0: past without which nothing is judged, also after an alarm
     refresh: float = 60.0  # s, > 0: between two snapshots of the live estimate
 
     def __post_init__(self) -> None:
@@ -88,7 +89,7 @@ class Mismatch:
     others    slots of changes that explain it about as well
     channel   "pitch" or "depth", whose prediction error grew more
     ratio     its prediction error over the level before
-    explained share of the excess error that the change explains
+    explained share of the innovations' excess that the change explains
     """
 
     t_us: int
@@ -133,34 +134,48 @@ class MismatchWatch:
         self._every = max(1, round(period / step))
         self._refresh = max(1, round(config.refresh / step / self._every)) * self._every
         self._settling = max(1, round(config.settling / step / self._every))
-        self._learning = round(0.5 * config.settling / step)
-        self._floor = 0.5 * np.array([estimator.robust.pitch_noise, estimator.robust.depth_noise])
+        self._learning = round(config.settling / step)
+        noise = np.array([estimator.robust.pitch_noise, estimator.robust.depth_noise])
+        self._floor = 0.5 * noise
         self._fixed = None if config.model is None else read_reference(config.model)
+        block = max(1, round(horizon / BLOCKS / step))
+        held_back = round(HELD_BACK * self._every / block)
+        memory = round(config.memory / step)
         self._window = PredictionWindow(max(10, round(horizon / step)), step)
-        self._history = PredictionHistory(max(self._settling, round(config.memory / step / self._every)))
-        self._recent: deque[tuple[Comparison, Array]] = deque(maxlen=max(config.persistence, NAMING))
+        self._innovations = Innovations(step, block, MOMENTS[0] + ORDER, noise)
+        self._whitening = Whitening(held_back, max(1, memory // block))
+        self._history = PredictionHistory(max(SMALLEST, memory // self._every), len(MOMENTS))
+        self._growths: deque[Array] = deque(maxlen=config.persistence)
+        self._strengths: deque[Array] = deque(maxlen=IN_A_ROW)
+        self._ratios: deque[Array] = deque(maxlen=SEEN_IN)
         self._samples = 0
         self._begin()
 
     def _begin(self) -> None:
         """Knows nothing: first the units of the errors are learnt, then what is usual."""
-        self.reference = self._fixed
+        self.reference: Reference | None = None
         """What is predicted with; None before anything is known."""
         self._candidate: Reference | None = None
         self._is_suspicious = False
         self._levels = self._floor
         self._first_errors: list[Array] = []
         self._history.clear()
+        self._whitening.clear()
         self._forget_recent()
+        if self._fixed is not None:
+            self._follow(self._fixed)
 
     def _forget_recent(self) -> None:
-        self._recent.clear()
+        self._growths.clear()
+        self._strengths.clear()
+        self._ratios.clear()
         self._waited = 0
         self._size = 0.0
 
     def clear(self) -> None:
         """Joins nothing across this moment: the vehicle rebooted, or its clock started anew."""
         self._window.clear()
+        self._innovations.clear()
         self._forget_recent()
 
     @property
@@ -171,34 +186,50 @@ class MismatchWatch:
     def push(self, sample: Sample, estimate: Estimate | None = None) -> Mismatch | None:
         """An alarm, if this sample raises one."""
         self._window.push(sample)
+        if self._innovations.push(sample):
+            self._whitening.take(self._innovations.means)
         self._samples += 1
         if estimate is not None:
             self._take(estimate)
         is_due = self._samples % self._every == 0 and self._window.is_full
         if self.reference is None or not is_due or not self._window.moves(2.0 * self._floor):
             return None
-        found = self._window.compare(self.reference, self._levels)
+        errors = self._window.errors(self.reference, self._levels)
         if len(self._first_errors) < LEVEL_WINDOWS:
-            self._first_errors.append(found.errors)
+            self._first_errors.append(errors)
             if len(self._first_errors) == LEVEL_WINDOWS:
                 self._levels = np.maximum(self._floor, self._levels * np.median(self._first_errors, axis=0))
             return None
-        return self._judge(found, sample.t_us)
+        if len(self._innovations.blocks) < MOMENTS[0] + ORDER or not self._whitening.is_known:
+            return None
+        evidence = evidence_of(self._innovations, self._whitening, MOMENTS, self._history.lacking)
+        return self._judge(Comparison(errors, evidence), sample.t_us)
 
     def _take(self, estimate: Estimate) -> None:
-        """The snapshot before this one becomes the reference, if nothing looks wrong and it is no worse."""
+        """The snapshot before this one becomes the reference, if nothing looks wrong and it is better."""
         snapshot = reference_of(estimate) if estimate.updates >= self._learning else None
         if snapshot is None or not snapshot.is_usable or self._is_suspicious:
             snapshot, self._candidate = None, None
         earlier, self._candidate = self._candidate, snapshot
         self._is_suspicious = False
-        if self.reference is None or earlier is None:
-            self.reference = self.reference or earlier
+        if earlier is None:
+            return
+        if self.reference is None:
+            self._follow(earlier)
         elif self._window.is_full:
-            before = self._window.compare(self.reference, self._levels).errors
-            after = self._window.compare(earlier, self._levels).errors
-            if (after <= NO_WORSE * before).all():
-                self.reference = earlier
+            before = self._window.errors(self.reference, self._levels)
+            after = self._window.errors(earlier, self._levels)
+            if (after <= BETTER * before).all():
+                self._follow(earlier)
+
+    def _follow(self, reference: Reference) -> None:
+        self.reference = reference
+        self._innovations.follow(reference)
+        self._history.begin_lacking()
+        if not self._whitening.has_begun:
+            means = self._innovations.means
+            for k in range(len(means)):
+                self._whitening.take(means[: k + 1])
 
     def _judge(self, found: Comparison, t_us: int) -> Mismatch | None:
         past = self._history.like(found)
@@ -206,42 +237,41 @@ class MismatchWatch:
         if past is None:
             self._forget_recent()
             return None
-        self._recent.append((found, past.deviations(found)))
-        if len(self._recent) < self._config.persistence:
-            return None
-        deviations = np.array([deviation for _, deviation in self._recent])
-        size = float(np.linalg.norm(np.mean(deviations, axis=0)))
-        threshold = self._config.threshold
-        self._is_suspicious |= size > SUSPICIOUS * threshold
+        self._strengths.append(past.strength(found))
+        self._growths.append(past.growth(found))
+        self._ratios.append(found.errors / past.usual_errors)
+        size = float(np.abs(np.mean(self._strengths, axis=0)).max()) / self._config.threshold
+        if np.max(self._ratios) < LEAST_RATIO:
+            size = min(size, 1.0)
+        if len(self._growths) == self._config.persistence:
+            size = max(size, float(np.mean(self._growths, axis=0).max()))
+        self._is_suspicious |= size > SUSPICIOUS
         if self._history.size < self._settling:
             return None
         self.current = None
         is_growing, self._size = size > self._size, size
-        if size <= threshold and not self._waited:
+        if size <= 1.0 and not self._waited:
             return None
         self._waited += 1
         if is_growing and self._waited < LONGEST_WAIT:
             return None
-        self.current = _explained([comparison for comparison, _ in self._recent][-NAMING:], past, t_us)
+        self.current = _explained(found, past, t_us)
         self._begin()
         return self.current
 
 
-def _explained(recent: list[Comparison], past: Past, t_us: int) -> Mismatch:
-    """The alarm with the change that explains most of the excess error, the same size in all windows.
+def _explained(found: Comparison, past: Past, t_us: int) -> Mismatch:
+    """The alarm with the change, and its moment, that explain most of the innovations' excess.
 
-    By least squares a change takes (sum of leverage x evidence)^2 / sum of leverage^2 off the sum of squares;
-    what the reference lacked already is taken off the evidence first.
+    By least squares a change takes the square of its ratio off the sum of their squares.
     """
-    evidence = np.array([each.evidence for each in recent])
-    leverage = np.array([each.leverage for each in recent])
-    news = evidence - leverage * past.sizes
-    gains = (leverage * news).sum(axis=0) ** 2 / (leverage**2).sum(axis=0)
-    errors = np.sqrt(np.mean([each.errors**2 for each in recent], axis=0))
-    ratios = errors / past.errors
+    news = found.evidence.ratios**2
+    gains = news.max(axis=0)
+    ratios = found.errors / past.usual_errors
     slots = [CHANGES[name] for name in NAMES]
-    excess = sum(float(each.squares) for each in recent) - len(recent) * past.squares
     best = int(np.argmax(gains))
+    moment = int(np.argmax(news[:, best]))
+    excess = float(found.evidence.squares[moment] - np.mean(past.squares[:, moment]))
     explained = min(float(gains[best]) / max(excess, 1e-9), 1.0)
     is_named = explained >= EXPLAINED
     as_good = {slot: None for slot, gain in zip(slots, gains, strict=True) if gain > AS_GOOD * gains[best]}

@@ -1,108 +1,127 @@
-"""What the reference missed before, while the vehicle moved at least as much."""
+"""What was usual before, while the vehicle moved at least as much."""
 
 from collections import deque
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from host.live.prediction_window import NAMES, Array, Comparison
+from host.live.evidence import Evidence, Lacking
+from host.live.innovations import MARKS, NAMES
+from host.live.reference import Array
 
-SMALLEST = 60  # windows that judge; where fewer moved as much, the most active ones, stretched
-SIMILAR = 0.8  # of the present activity: the least that counts as moving as much
-HELD_BACK = 60  # windows that are not yet history: the beginning of a fault must not set its own level
-OVERLAP = 10.0  # windows that share their samples, and count as one
-CAUTION = 4.0  # over the number of separate windows: by so much more is the spread that few of them show
+SMALLEST = 60  # windows that judge
+HELD_BACK = 40  # windows that are not yet history: the beginning of a fault must not set its own level
+CAUTION = 400.0  # windows; over the number of those known, by so much more may yet be usual
+WILDEST = 4  # the largest of the past but for three is the most that is usual
+WHITE = 2.7  # the least that it can be for a ratio: white noise has as much
+OVERLAP = 40.0  # windows that tell no more of what the reference lacks than one, for they share their samples
+RIDGE = 20.0  # windows' worth of belief that the reference lacks nothing
 
-DETECTING = ("heave_force", "pitch_moment", "plane_force")
+DETECTING = [NAMES.index(name) for name in ("heave_force", "pitch_moment", "plane_force")]
 """The changes whose evidence alone may raise an alarm: the least heavy-tailed at sea."""
 
-_EVIDENCE = slice(2, 2 + len(NAMES))
-_LEVERAGE = slice(2 + len(NAMES), 2 + 2 * len(NAMES))
-_DETECTING = [2 + NAMES.index(name) for name in DETECTING]
-SPREAD_FLOOR = np.array([0.1, 0.1, 1.0, 1.0, 1.0])
-"""Least spread of the logarithm of an error, 10 %, and of an evidence, that of white noise."""
+
+class Comparison(NamedTuple):
+    """One window: rms prediction error of pitch and depth, (2,), by their levels, and the evidence."""
+
+    errors: Array
+    evidence: Evidence
+
+    @property
+    def activity(self) -> float:
+        """By how much the plane moves the vehicle."""
+        return float(self.evidence.leverage[0, NAMES.index("plane_force")])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Past:
-    """What is usual: windows of the past, a row each as in `_row`.
+    """What is usual: windows of the past, by the first index.
 
-    stretch  by which their errors must be multiplied for a vehicle that moves more than it did in them
+    stretch  by which what they missed must be multiplied for a vehicle that moves more than it did in them
     """
 
-    rows: Array
+    errors: Array
+    ratios: Array
+    squares: Array
     stretch: float = 1.0
 
-    def deviations(self, found: Comparison) -> Array:
-        """Of the logarithm of both errors and of the evidence of `DETECTING`, in robust spreads.
+    def strength(self, found: Comparison) -> Array:
+        """The ratios of `DETECTING`, (moments, 3), by the largest that are usual."""
+        usual = np.partition(np.abs(self.ratios[:, :, DETECTING]), -WILDEST, axis=0)[-WILDEST]
+        most = self.stretch * np.maximum(usual, WHITE) * (1.0 + CAUTION / len(self.ratios))
+        strength: Array = found.evidence.ratios[:, DETECTING] / most
+        return strength
 
-        Less error than usual is no deviation.
-        """
-        rows = _judged(self.stretch * self.rows)
-        usual = np.median(rows, axis=0)
-        spread = np.maximum(1.4826 * np.median(np.abs(rows - usual), axis=0), SPREAD_FLOOR)
-        spread *= 1.0 + CAUTION * OVERLAP / len(rows)
-        deviation: Array = (_judged(_row(found)[None, :])[0] - usual) / spread
-        deviation[:2] = np.maximum(deviation[:2], 0.0)
-        return deviation
+    def growth(self, found: Comparison) -> Array:
+        """Both errors, (2,), by twice the largest that are usual."""
+        usual = np.partition(self.errors, -WILDEST, axis=0)[-WILDEST]
+        growth: Array = found.errors / (2.0 * self.stretch * usual * (1.0 + CAUTION / len(self.errors)))
+        return growth
 
     @property
-    def errors(self) -> Array:
+    def usual_errors(self) -> Array:
         """Rms prediction error of pitch and depth, (2,)."""
-        errors: Array = self.stretch * np.sqrt(np.mean(self.rows[:, :2] ** 2, axis=0))
+        errors: Array = self.stretch * np.sqrt(np.mean(self.errors**2, axis=0))
         return errors
-
-    @property
-    def squares(self) -> float:
-        """Sum of the squared errors of a window."""
-        return float(self.stretch**2 * np.mean(self.rows[:, -2]))
-
-    @property
-    def sizes(self) -> Array:
-        """Size of each change that the reference lacked already."""
-        sizes: Array = np.median(self.rows[:, _EVIDENCE] / self.rows[:, _LEVERAGE], axis=0)
-        return sizes
 
 
 class PredictionHistory:
-    """The last `length` windows, but for the newest."""
+    """The last `length` windows, each with the evidence since so many `moments`, but for the newest."""
 
-    def __init__(self, length: int) -> None:
-        self._rows = np.empty((length, 4 + 2 * len(NAMES)))
-        self._newest: deque[Array] = deque()
+    def __init__(self, length: int, moments: int) -> None:
+        self._errors = np.empty((length, 2))
+        self._ratios = np.empty((length, moments, len(NAMES)))
+        self._squares = np.empty((length, moments))
+        self._activity = np.empty(length)
+        self._keep = 1.0 - 1.0 / length
+        self._newest: deque[Comparison] = deque()
         self.clear()
 
     def clear(self) -> None:
         self.size = 0
         """Windows that count."""
         self._newest.clear()
+        self.begin_lacking()
+
+    def begin_lacking(self) -> None:
+        """Another reference lacks other things."""
+        self._gram, self._products, self._weight = np.zeros((len(MARKS),) * 2), np.zeros(len(MARKS)), 0.0
+
+    @property
+    def lacking(self) -> Lacking:
+        """What the reference lacked in all windows, by least squares; little where there were few."""
+        if not self._weight:
+            return Lacking(self._products, self._gram)
+        belief = RIDGE / self._weight * np.diag(self._gram)
+        inverse: Array = np.asarray(np.linalg.inv(self._gram + np.diag(belief + 1e-12)))
+        return Lacking(inverse @ self._products, OVERLAP * inverse)
 
     def add(self, found: Comparison) -> None:
         """Takes a window; it counts after `HELD_BACK` more."""
-        self._newest.append(_row(found))
-        if len(self._newest) > HELD_BACK:
-            self._rows[self.size % len(self._rows)] = self._newest.popleft()
-            self.size += 1
+        self._newest.append(found)
+        if len(self._newest) <= HELD_BACK:
+            return
+        known = self._newest.popleft()
+        k = self.size % len(self._errors)
+        self._errors[k], self._activity[k] = known.errors, known.activity
+        self._ratios[k], self._squares[k] = known.evidence.ratios, known.evidence.squares
+        self.size += 1
+        self._gram = self._keep * self._gram + known.evidence.gram
+        self._products = self._keep * self._products + known.evidence.products
+        self._weight = self._keep * self._weight + 1.0
 
     def like(self, found: Comparison) -> Past | None:
-        """The windows that moved at least about as much. None before there are any to judge by.
+        """The windows. None before there are enough to judge by.
 
         An error that is quadratic in the motion, as of drag, is the worst that a smooth hull can hide.
         """
-        rows = self._rows[: min(self.size, len(self._rows))]
-        if len(rows) < SMALLEST:
+        known = min(self.size, len(self._errors))
+        if known < SMALLEST:
             return None
-        alike = rows[rows[:, -1] >= SIMILAR * found.activity]
-        if len(alike) >= SMALLEST:
-            return Past(rows=alike)
-        alike = rows[np.argpartition(rows[:, -1], -SMALLEST)[-SMALLEST:]]
-        return Past(rows=alike, stretch=max(1.0, found.activity / float(np.median(alike[:, -1]))) ** 2)
-
-
-def _row(found: Comparison) -> Array:
-    return np.concatenate([found.errors, found.evidence, found.leverage, [found.squares, found.activity]])
-
-
-def _judged(rows: Array) -> Array:
-    """What may raise an alarm."""
-    return np.column_stack([np.log(np.maximum(rows[:, :2], 1e-6)), rows[:, _DETECTING]])
+        return Past(
+            errors=self._errors[:known],
+            ratios=self._ratios[:known],
+            squares=self._squares[:known],
+            stretch=max(1.0, found.activity / float(self._activity[:known].max())) ** 2,
+        )

@@ -5,7 +5,8 @@ import copy
 import numpy as np
 import pytest
 
-from host.live.prediction_window import PredictionWindow, Reference
+from host.live.prediction_window import PredictionWindow
+from host.live.reference import Reference
 from tools.bench_alarm import FAULTS, STEP, Dive, errors, recorded, scenario_of, size_of
 
 REFERENCE = Reference(a1=-0.63, a2=-3.39, a3=-8.2, b1=0.41, b2=-3.94, u0=2.5)
