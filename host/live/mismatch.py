@@ -7,8 +7,8 @@ of some moments (`host.live.evidence`). And once a second the reference runs fre
 rough sea, a nonlinear hull and a noisy sensor set their own level. An alarm is evidence well beyond the
 strongest that was usual, or a free run that misses by twice the worst of it for many seconds.
 
-The reference is a snapshot of the live estimate, one to two minutes old and kept while anything looks
-suspicious, so that what the estimator learns of a fault cannot hide it.
+The reference is a snapshot of the live estimate, one to two minutes old, and kept until one that is clearly
+better comes while nothing looks suspicious: what the estimator learns of a fault cannot hide it.
 """
 
 from collections import deque
@@ -46,7 +46,8 @@ SEEN_IN = 10  # windows, in one of which it must have been
 LEVEL_WINDOWS = 60  # windows that set the units in which a channel's errors count
 SUSPICIOUS = 0.7  # of what is an alarm: from here on the reference is kept as it is
 BETTER = 0.9  # ratio of prediction errors below which a new snapshot takes the place of the reference
-LONGEST_WAIT = 5  # windows for which an alarm that still grows waits: the moment of the change misleads
+SHORT_WAIT, LONG_WAIT = 3, 6  # windows for which an alarm that still grows waits: its first moments mislead
+PLAIN = 1.25  # of what is an alarm: beyond that the wait is long
 LARGEST_RATIO = 655.0  # that is sent
 EXPLAINED = 0.2  # share of the innovations' excess that a change must explain to be named
 AS_GOOD = 0.85  # of what the best change explains: one of another slot that explains more is as good
@@ -88,7 +89,7 @@ class Mismatch:
     change    the simple change that explains most of it; "" for slot unknown
     others    slots of changes that explain it about as well
     channel   "pitch" or "depth", whose prediction error grew more
-    ratio     its prediction error over the level before
+    ratio     its prediction error over the level before, in the worst of the last windows
     explained share of the innovations' excess that the change explains
     """
 
@@ -253,21 +254,20 @@ class MismatchWatch:
         if size <= 1.0 and not self._waited:
             return None
         self._waited += 1
-        if is_growing and self._waited < LONGEST_WAIT:
+        if is_growing and self._waited < (LONG_WAIT if size > PLAIN else SHORT_WAIT):
             return None
-        self.current = _explained(found, past, t_us)
+        self.current = _explained(found, past, np.max(self._ratios, axis=0), t_us)
         self._begin()
         return self.current
 
 
-def _explained(found: Comparison, past: Past, t_us: int) -> Mismatch:
+def _explained(found: Comparison, past: Past, ratios: Array, t_us: int) -> Mismatch:
     """The alarm with the change, and its moment, that explain most of the innovations' excess.
 
     By least squares a change takes the square of its ratio off the sum of their squares.
     """
     news = found.evidence.ratios**2
     gains = news.max(axis=0)
-    ratios = found.errors / past.usual_errors
     slots = [CHANGES[name] for name in NAMES]
     best = int(np.argmax(gains))
     moment = int(np.argmax(news[:, best]))

@@ -1,4 +1,4 @@
-"""What was usual before, while the vehicle moved at least as much."""
+"""What was usual before: the windows of the past, by which a new one is judged."""
 
 from collections import deque
 from dataclasses import dataclass
