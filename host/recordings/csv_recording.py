@@ -9,6 +9,7 @@ import numpy as np
 from bridge.measurement import Quantity
 from bridge.measurement_gate import LARGEST
 from host.errors import RecordingError
+from host.recordings.clock_time import clock_seconds
 from host.recordings.csv_map import UNITS, CsvColumn, CsvMap
 from host.recordings.plane_in_table import plane_readings
 from host.recordings.recording import NEEDED, Array, Recording, file_sha256, split_at_gaps
@@ -59,6 +60,9 @@ def read_table(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> 
             raw = _numbers(rows, header.index(column.column), decimal)
             counts[f"missing.{quantity}"] = int(np.isnan(raw).sum())
             values[quantity] = _in_si(path, quantity, column, raw, counts)
+            if quantity == "time" and np.isnan(raw).all():
+                values["time"] = clock_seconds(_cells(rows, header.index(column.column)))
+                counts["missing.time"] = int(np.isnan(values["time"]).sum())
         elif found > 1:
             raise RecordingError(f"{path}: column {column.column!r} is in the file {found} times; keep one")
         elif quantity in CHANNELS and quantity not in needs:
@@ -70,9 +74,10 @@ def read_table(path: Path, columns: CsvMap, needs: tuple[str, ...] = NEEDED) -> 
             )
     if np.isnan(values["time"]).all() and rows:
         named = columns.time.column
-        example = next((cells[header.index(named)] for cells in rows if len(cells) > header.index(named)), "")
+        example = next(filter(None, _cells(rows, header.index(named))), "")
         raise RecordingError(
-            f"{path}: column {named!r} for time holds no numbers (got {example!r}), as seconds are"
+            f"{path}: column {named!r} for time holds neither seconds nor times as 2026-03-01T12:00:00.5 "
+            f"or 12:00:00.5 (got {example!r})"
         )
     notes: tuple[str, ...] = ()
     repeats, are_rows_twice = _repeated_times(values)
@@ -146,14 +151,18 @@ def _read_rows(path: Path) -> tuple[list[str], list[list[str]], str]:
     return header, [row for row in lines[1:] if row], decimal
 
 
+def _cells(rows: list[list[str]], index: int) -> list[str]:
+    return [row[index] if index < len(row) else "" for row in rows]
+
+
 def _numbers(rows: list[list[str]], index: int, decimal: str) -> Array:
-    def number(row: list[str]) -> float:
+    def number(cell: str) -> float:
         try:
-            return float(row[index].replace(decimal, "."))
-        except (ValueError, IndexError):
+            return float(cell.replace(decimal, "."))
+        except ValueError:
             return np.nan
 
-    column = np.array([number(row) for row in rows], dtype=float)
+    column = np.array([number(cell) for cell in _cells(rows, index)], dtype=float)
     column[~np.isfinite(column)] = np.nan
     return column
 

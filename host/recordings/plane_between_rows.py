@@ -20,7 +20,7 @@ from host.recordings.recording import Array, Recording
 
 NOTE = "the plane is taken to move evenly from row to row: the recording follows that better than angles held"
 
-NOTE_BETWEEN = "the plane was read in few of the rows: it is taken to move on from reading to reading"
+NOTE_BETWEEN = "the plane was not read in every row: it is taken to move on from reading to reading"
 
 
 def with_moving_plane(recording: Recording) -> Recording:

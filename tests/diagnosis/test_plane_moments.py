@@ -38,7 +38,7 @@ def test_each_step_is_put_where_it_was(rows: int) -> None:
     late, left = (np.std(one.rudder - true.rudder) for one in (seen, moved))
     assert left < 0.2 * late
     assert np.mean(np.isclose(moved.rudder, true.rudder)) > 0.99
-    assert moved.notes[-1].startswith("the plane was read in few of the rows: when it stepped")
+    assert moved.notes[-1].startswith("the plane was not read in every row: when it stepped")
     doubt = moved.plane_doubt
     assert doubt is not None
     assert doubt.shape == (UnseenSteps([seen]).mean.size, 2, seen.time.size)

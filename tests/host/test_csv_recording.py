@@ -160,7 +160,10 @@ def test_a_speed_of_zero_all_along_is_no_speed_and_that_is_said(tmp_path: Path) 
         (b"time_s,depth_m,pitch_rad\n0,1,2\n", "column 'rudder_rad' for rudder is not in the file"),
         (HEADER.encode() + b"\n0,1,0,0\n", "only 1 rows"),
         (HEADER.encode() + b"\n" + b"\n".join(b"%d,,,0" % k for k in range(20)), "no stretch of 10 rows"),
-        (HEADER.encode() + b"\n" + b"\n".join(b"a,b,c,d" for _ in range(20)), "for time holds no numbers"),
+        (
+            HEADER.encode() + b"\n" + b"\n".join(b"a,b,c,d" for _ in range(20)),
+            "for time holds neither seconds nor times",
+        ),
     ],
 )
 def test_bad_file_says_what_is_wrong_in_one_line(tmp_path: Path, content: bytes, message: str) -> None:
@@ -199,9 +202,15 @@ def test_a_column_in_another_unit_is_refused(tmp_path: Path) -> None:
         read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
 
 
-def test_a_time_of_day_is_no_number(tmp_path: Path) -> None:
+def test_a_time_of_day_is_read(tmp_path: Path) -> None:
     lines = [f"12:00:{k:02d},10,{0.01 * k},0.1" for k in range(50)]
-    with pytest.raises(RecordingError, match=r"column 'time_s' for time holds no numbers .*'12:00:00'"):
+    (recording,) = read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
+    assert recording.time == pytest.approx(np.arange(50.0))
+
+
+def test_a_time_that_is_none_is_told(tmp_path: Path) -> None:
+    lines = [f"1/3/2026 12:00:{k:02d},10,{0.01 * k},0.1" for k in range(50)]
+    with pytest.raises(RecordingError, match=r"for time holds neither seconds nor .*'1/3/2026 12:00:00'"):
         read_csv_recording(write(tmp_path / "a.csv", lines), CsvMap())
 
 

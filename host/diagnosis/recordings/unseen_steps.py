@@ -7,7 +7,7 @@ from host.recordings.plane_between_rows import between_readings
 from host.recordings.plane_readings import PlaneReadings
 from host.recordings.recording import Array, Recording
 
-NOTE = "the plane was read in few of the rows: when it stepped between its readings is estimated"
+NOTE = "the plane was not read in every row: when it stepped between its readings is estimated"
 MOST_STEPS = 400  # whose moments are estimated: the largest
 MOST_VALUES = 3_000_000  # of what each does to each row: of an hour at 10 Hz fewer steps
 
