@@ -80,7 +80,6 @@ class Innovations:
         self._t_us: int | None = None
         self._waiting: Sample | None = None
         self._believed = [math.nan, math.nan]
-        self._plane, self._is_heard = math.nan, False
         self._begin()
 
     def _begin(self) -> None:
@@ -122,15 +121,12 @@ class Innovations:
         before, self._waiting = self._waiting, sample
         if before is None:
             return False
-        self._is_heard = not math.isnan(before.rudder)
-        turned = before.rudder if self._is_heard else self._plane
         row = (
             self._without_spike(0, before.pitch, sample.pitch),
             self._without_spike(1, before.depth, sample.depth),
-            turned if self._is_heard else math.nan,
+            before.rudder,
             before.speed,
         )
-        self._plane = turned
         self._rows.append(row)
         return self._reference is not None and self._filter(*row)
 
