@@ -99,8 +99,8 @@ class Innovations:
         """Filters with this reference from now on, and once more what is remembered."""
         self._reference = reference
         self._noise = np.maximum(self._least_noise, _noise_of(np.array(self._rows).reshape(-1, 4)[:, :2]))
-        self._move, self._push = reference.discrete(self._step)
-        heave, pitch, sinking = self._push.T
+        self._move, push = reference.discrete(self._step)
+        heave, pitch, sinking = push.T
         plane = reference.b1 * heave + reference.b2 * pitch
         changes = [heave, heave, pitch, pitch, pitch, plane, plane, -sinking, np.zeros(4)]
         self._changes = np.stack([*changes, heave, heave, pitch, plane], axis=1)

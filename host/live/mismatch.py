@@ -3,12 +3,13 @@
 A reference model foretells the vehicle in two ways. A filter that follows it leaves innovations; freed of the
 spectrum that waves and noise have given them so far, they speak for or against each simple change since each
 of some moments (`host.live.evidence`). And once a second the reference runs freely over the last seconds
-(`host.live.prediction_window`). Both are judged by what was usual while the vehicle moved at least as much: a
-rough sea, a nonlinear hull and a noisy sensor set their own level. An alarm is evidence well beyond the
-strongest that was usual, or a free run that misses by twice the worst of it for many seconds.
+(`host.live.prediction_window`). Both are judged by what was usual, and by more where the vehicle moves more
+than it ever did: a rough sea, a nonlinear hull and a noisy sensor set their own level. An alarm is evidence
+well beyond the strongest that was usual while the free runs miss by more as well, or free runs that miss by
+twice the worst that was usual for many seconds.
 
-The reference is a snapshot of the live estimate, one to two minutes old, and kept until one that is clearly
-better comes while nothing looks suspicious: what the estimator learns of a fault cannot hide it.
+The reference is a snapshot of the live estimate, taken a minute or two late, and kept until one that is
+clearly better comes while nothing looks suspicious: what the estimator learns of a fault cannot hide it.
 """
 
 from collections import deque
@@ -25,7 +26,7 @@ from host.live.innovations import CHANGES, NAMES, Innovations
 from host.live.prediction_history import HELD_BACK, SMALLEST, Comparison, Past, PredictionHistory
 from host.live.prediction_window import PredictionWindow
 from host.live.reference import Array, Reference, read_reference, reference_of
-from host.live.whitening import ORDER, Whitening
+from host.live.whitening import LEAST, ORDER, Whitening
 
 SLOTS = ("none", "heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment", "unknown")
 """Slots by the number under which they are published."""
@@ -58,9 +59,7 @@ class MismatchConfig:
     """The alarm of a live run. Durations left out follow from the estimator's pitch time T."""
 
     enabled: bool = True
-    model: Path | None = (
-        None  # model.json to predict with; left out: what was learnt until a minute or two ago
-    )
+    model: Path | None = None  # model.json to predict with; left out: the best that was learnt on the way
     horizon: float | None = None  # s, > 0: length of a free run; default 10 T (10 s)
     period: float | None = None  # s, > 0: between two free runs; default a tenth of the horizon
     persistence: int = 20  # free runs, 1 to 100, over which their errors are averaged
@@ -144,7 +143,7 @@ class MismatchWatch:
         memory = round(config.memory / step)
         self._window = PredictionWindow(max(10, round(horizon / step)), step)
         self._innovations = Innovations(step, block, MOMENTS[0] + ORDER, noise)
-        self._whitening = Whitening(held_back, max(1, memory // block))
+        self._whitening = Whitening(held_back, max(LEAST, memory // block))
         self._history = PredictionHistory(max(SMALLEST, memory // self._every), len(MOMENTS))
         self._growths: deque[Array] = deque(maxlen=config.persistence)
         self._strengths: deque[Array] = deque(maxlen=IN_A_ROW)
@@ -233,7 +232,7 @@ class MismatchWatch:
                 self._whitening.take(means[: k + 1])
 
     def _judge(self, found: Comparison, t_us: int) -> Mismatch | None:
-        past = self._history.like(found)
+        past = self._history.usual_for(found)
         self._history.add(found)
         if past is None:
             self._forget_recent()

@@ -111,8 +111,8 @@ class PredictionHistory:
         self._products = self._keep * self._products + known.evidence.products
         self._weight = self._keep * self._weight + 1.0
 
-    def like(self, found: Comparison) -> Past | None:
-        """The windows. None before there are enough to judge by.
+    def usual_for(self, found: Comparison) -> Past | None:
+        """The windows so far. None before there are enough to judge by.
 
         An error that is quadratic in the motion, as of drag, is the worst that a smooth hull can hide.
         """

@@ -202,3 +202,14 @@ def test_what_the_reference_lacked_all_along_is_no_evidence() -> None:
     assert abs(known.ratios[0, k]) < 1e-6 * abs(bare.ratios[0, k])
     unsure = evidence_of(innovations, whitening, [20], Lacking(NOTHING.sizes, np.eye(len(MARKS))))
     assert abs(unsure.ratios[0, k]) < 0.2 * abs(bare.ratios[0, k])
+
+
+def test_noise_is_not_taken_for_spikes() -> None:
+    """A sensor ten times as noisy as was thought: once a reference is followed its noise is known."""
+    innovations = Innovations(H, 5, 40, NOISE)
+    for k, sample in enumerate(dive(VEHICLE, 60.1, noise=10.0)):
+        innovations.push(sample)
+        if k == 300:
+            innovations.follow(VEHICLE)
+    assert (innovations.means[-20:] != 0.0).all()
+    assert np.abs(innovations.means[-20:]).max() < 3.0

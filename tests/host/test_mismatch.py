@@ -256,3 +256,23 @@ def test_it_can_be_switched_off(tmp_path: Path) -> None:
 def test_an_estimate_without_coupling_is_a_reference_without_it() -> None:
     estimate: Any = SimpleNamespace(**(asdict(VEHICLE) | {"c_wq": math.nan}))
     assert reference_of(estimate) == VEHICLE
+
+
+def test_sensors_that_become_much_noisier_are_told_and_no_change_is_blamed() -> None:
+    rng = np.random.default_rng(4)
+    noisy = (
+        replace(s, depth=s.depth + 0.2 * rng.normal(), pitch=s.pitch + 0.03 * rng.normal())
+        if s.t_us >= 400_000_000
+        else s
+        for s in dive(440.0)
+    )
+    (told,) = alarms(noisy)
+    assert told.slot == "unknown"
+    assert told.ratio > 4.0
+
+
+def test_evidence_is_no_alarm_while_the_free_run_misses_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    fault = {"at": 300.0, "plane": 0.7}
+    assert len(alarms(dive(330.0, **fault))) == 1
+    monkeypatch.setattr(PredictionWindow, "errors", lambda *_: np.ones(2))
+    assert alarms(dive(330.0, **fault)) == []
