@@ -35,9 +35,14 @@ CHANGES = {
 NAMES = tuple(CHANGES)
 LACKING = ("heave_drag", "heave_by_turning", "pitch_by_heave", "plane_at_large_angles")
 """What a linear reference may lack all along, besides: w|w| and q in heave, w in pitch, delta|delta|."""
-MARKS = NAMES + LACKING
+SLOWING = ("speed_by_plane", "speed_by_pitch")
+"""What it lacks of the forward speed u, which drag of the plane and weight change: T u' = c - u, of each
+with c = delta^2 or theta, where every term of the reference has its u or u^2."""
+MARKS = NAMES + LACKING + SLOWING
+SPEED = 4 + len(NAMES + LACKING)
 DATUM = 4 + NAMES.index("pitch_datum")
 
+SPEED_LAG = 5.0  # s, T of most vehicles; one of 1.5 to 12 s is served as well
 AGITATION = 0.1  # m/s^2 and rad/s^2, per root of Hz: what pushes the vehicle beside its plane
 PLANE_DOUBT = 0.1  # rad, by which a plane that is not heard may have moved
 MOST_NOISE = 0.9  # quantile of the second differences that tells the noise: outliers are above it
@@ -87,6 +92,7 @@ class Innovations:
         self._covariance = START.copy()
         self._refused = [0, 0]
         self._has_begun = False
+        self._slowed = np.zeros(len(SLOWING))
         self._open_block()
 
     def _open_block(self) -> None:
@@ -105,6 +111,9 @@ class Innovations:
         changes = [heave, heave, pitch, pitch, pitch, plane, plane, -sinking, np.zeros(4)]
         self._changes = np.stack([*changes, heave, heave, pitch, plane], axis=1)
         self._by_plane = plane
+        turning = reference.a2 * pitch + reference.c_wq * heave
+        per_speed = np.stack([reference.a1 * heave, turning, 2.0 * plane], axis=1) / reference.u0
+        self._by_speed = np.column_stack([per_speed, -sinking])
         self._steady = reference.heave_offset * heave + reference.pitch_offset * pitch
         agitation = AGITATION**2 * self._step
         self._unrest = np.diag([agitation, agitation, 1e-8, 1e-8])
@@ -172,10 +181,12 @@ class Innovations:
         self._held = plane = rudder if is_heard else self._held
         w, q, theta, _ = x.tolist()
         d = self._move @ d
-        d[:, 4:] += self._changes * (
+        d[:, 4:SPEED] += self._changes * (
             *(1.0, w, 1.0, q, theta, plane, turned, theta, 0.0),
             *(w * abs(w), q, w, plane * abs(plane)),
         )
+        d[:, SPEED:] += np.outer(self._by_speed @ (w, q, plane, theta), self._slowed)
+        self._slowed += self._step / SPEED_LAG * (np.array([plane**2, theta]) - self._slowed)
         x = self._move @ x + self._steady + plane * self._by_plane
         if not math.isnan(speed) and self._reference is not None:
             x[ZETA] -= (speed - self._reference.u0) * theta * self._step

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from firmware_model.sample import Sample
 from host.live.evidence import Lacking, evidence_of
-from host.live.innovations import MARKS, NAMES, Innovations
+from host.live.innovations import MARKS, NAMES, SLOWING, SPEED_LAG, Innovations
 from host.live.reference import Array, Reference
 from host.live.whitening import LEAST, ORDER, Whitening, whitened
 
@@ -35,6 +35,20 @@ def dive(vehicle: Reference, seconds: float, *, heave: float = 0.0, datum: float
         is_gone = missing and k % 37 in (5, 6, 7, 20)
         yield Sample(t_us=k * 100_000, pitch=seen[0], depth=math.nan if is_gone else seen[1], rudder=delta)
         state = move @ state + push @ (vehicle.b1 * delta + heave * changed, vehicle.b2 * delta, 0.0)
+
+
+def slowed(vehicle: Reference, seconds: float, by_plane: float, by_pitch: float) -> Iterator[Sample]:
+    """The same dive at a speed that lags behind, as drag and weight have it."""
+    state, slower = np.array([0.0, 0.0, 0.0, 10.0]), np.zeros(2)
+    for sample in dive(vehicle, seconds):
+        yield replace(sample, pitch=state[2], depth=state[3])
+        ratio = 1.0 + slower @ (by_plane, by_pitch) / vehicle.u0
+        now = {name: ratio * getattr(vehicle, name) for name in ("a1", "a2", "c_wq", "u0")}
+        move, push = replace(vehicle, **now).discrete(H)
+        by_flow = ratio**2 * sample.rudder
+        drives = np.array([sample.rudder**2, state[2]])
+        state = move @ state + push @ np.array([vehicle.b1 * by_flow, vehicle.b2 * by_flow, 0.0])
+        slower = slower + H / SPEED_LAG * (drives - slower)
 
 
 def followed(samples: Iterator[Sample], reference: Reference = VEHICLE) -> Innovations:
@@ -85,6 +99,14 @@ def test_a_mark_is_what_another_coefficient_adds(name: str, coefficient: str) ->
     other = replace(VEHICLE, **{coefficient: getattr(VEHICLE, coefficient) + small})
     innovations = followed(dive(other, 40.1))
     found, foreseen = series(innovations), small * innovations.marks([40])[-20:, :, 0, MARKS.index(name)]
+    assert np.linalg.norm(found - foreseen) < 0.15 * np.linalg.norm(found)
+
+
+@pytest.mark.parametrize(("name", "size"), [("speed_by_plane", -2.0), ("speed_by_pitch", -0.5)])
+def test_a_mark_is_what_a_falling_speed_adds(name: str, size: float) -> None:
+    by_plane, by_pitch = (size * (each == name) for each in SLOWING)
+    innovations = followed(slowed(VEHICLE, 40.1, by_plane, by_pitch))
+    found, foreseen = series(innovations), size * innovations.marks([40])[-20:, :, 0, MARKS.index(name)]
     assert np.linalg.norm(found - foreseen) < 0.15 * np.linalg.norm(found)
 
 
