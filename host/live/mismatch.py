@@ -63,7 +63,7 @@ class MismatchConfig:
     horizon: float | None = None  # s, > 0: length of a free run; default 10 T (10 s)
     period: float | None = None  # s, > 0: between two free runs; default a tenth of the horizon
     persistence: int = 20  # free runs, 1 to 100, over which their errors are averaged
-    threshold: float = 1.6  # > 0: evidence that is an alarm, by the strongest that is usual
+    threshold: float = 1.4  # > 0: evidence that is an alarm, by the strongest that is usual
     memory: float = 1800.0  # s, > 0: past that sets the level
     settling: float = 120.0  # s, >= 0: past without which nothing is judged, also after an alarm
     refresh: float = 60.0  # s, > 0: between two snapshots of the live estimate
