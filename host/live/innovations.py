@@ -36,13 +36,13 @@ NAMES = tuple(CHANGES)
 LACKING = ("heave_drag", "heave_by_turning", "pitch_by_heave", "plane_at_large_angles")
 """What a linear reference may lack all along, besides: w|w| and q in heave, w in pitch, delta|delta|."""
 SLOWING = ("speed_by_plane", "speed_by_pitch")
-"""What it lacks of the forward speed u, which drag of the plane and weight change: T u' = c - u, of each
-with c = delta^2 or theta, where every term of the reference has its u or u^2."""
+"""What it lacks of the forward speed, which drag of the plane and weight along the hull change late:
+T s' = delta^2 - s and T s' = theta - s, m/s once times their sizes, in all terms that grow with u or u^2."""
 MARKS = NAMES + LACKING + SLOWING
 SPEED = 4 + len(NAMES + LACKING)
 DATUM = 4 + NAMES.index("pitch_datum")
 
-SPEED_LAG = 5.0  # s, T of most vehicles; one of 1.5 to 12 s is served as well
+SPEED_LAG = 5.0  # s, T; with 1.5 to 12 s the alarm tells as much
 AGITATION = 0.1  # m/s^2 and rad/s^2, per root of Hz: what pushes the vehicle beside its plane
 PLANE_DOUBT = 0.1  # rad, by which a plane that is not heard may have moved
 MOST_NOISE = 0.9  # quantile of the second differences that tells the noise: outliers are above it

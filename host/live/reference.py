@@ -36,9 +36,10 @@ class Reference:
 
     @property
     def is_usable(self) -> bool:
-        """Whether it is known, and does not run away."""
+        """Whether it is known, goes ahead, and does not run away."""
         values = [getattr(self, item.name) for item in fields(self)]
-        return all(map(math.isfinite, values)) and self.a1 <= 0.0 and self.a2 <= 0.0 and self.a3 <= 0.0
+        is_stable = self.a1 <= 0.0 and self.a2 <= 0.0 and self.a3 <= 0.0
+        return all(map(math.isfinite, values)) and self.u0 > 0.0 and is_stable
 
     def discrete(self, step: float) -> tuple[Array, Array]:
         """Transition (4, 4) over a step of s, and what is added by pushes held over it, (4, 3): exact.
@@ -77,7 +78,7 @@ def read_reference(path: Path) -> Reference:
     if effects:
         raise ConfigError(f"mismatch.model {path} must hold no effects (got {', '.join(effects)})")
     if not reference.is_usable:
-        raise ConfigError(f"mismatch.model {path} must be a stable vehicle (got {reference})")
+        raise ConfigError(f"mismatch.model {path} must be a stable vehicle that goes ahead (got {reference})")
     return reference
 
 

@@ -197,6 +197,8 @@ def test_a_model_file_that_is_none_is_one_line(tmp_path: Path, text: str) -> Non
 def test_a_model_that_runs_away_or_is_missing_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="stable"):
         read_reference(model_file(tmp_path / "model.json", a3=5.0))
+    with pytest.raises(ConfigError, match="goes ahead"):
+        read_reference(model_file(tmp_path / "model.json", u0=0.0))
     with pytest.raises(ConfigError, match="cannot be read"):
         read_reference(tmp_path / "none.json")
 
