@@ -97,13 +97,16 @@ def ascend(
     settled      of the log-likelihood: a step that gains less is the last
     """
     here, damping, converged, used = place(point, model), FIRST_DAMPING, False, 0
+    moves_gain = False
     while not converged and used < most_steps and np.isfinite(here.likelihood):
         used += 1
         step = GaussNewton(model.whitened(here.point, here.passes), here.point, free)
         scoring = None if holds_noise else _Scoring(here, model)
-        there, damping = _uphill(here, model, step, scoring, damping)
-        is_stuck = not there.likelihood - here.likelihood > settled
-        if is_stuck and not holds_gain and step.promise() > FALSE_PROMISE:
+        if not moves_gain:
+            there, damping = _uphill(here, model, step, scoring, damping)
+            is_stuck = not there.likelihood - here.likelihood > settled
+            moves_gain = is_stuck and not holds_gain and step.promise() > FALSE_PROMISE
+        if moves_gain:  # from then on: slopes that were false once are so mostly again
             there, damping = _uphill(here, model, _scored(here, model, step), scoring, FIRST_DAMPING)
         gained = there.likelihood - here.likelihood
         converged = not gained > settled

@@ -1,6 +1,7 @@
 """The ascent of a filter's likelihood where the hull is unstable and hardly any force excuses what is off."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -68,3 +69,22 @@ def test_what_slopes_at_fixed_gain_hide_is_climbed_all_the_same() -> None:
     for model, point in starts:
         stuck, _, _ = ascend(point, model, FREE, 40, holds_noise=True, holds_gain=True)
         assert stuck.likelihood < ends[0] - 100.0
+
+
+def test_once_slopes_at_fixed_gain_were_false_they_are_not_asked_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model, point = unstable(0.7)
+    asked = []
+    uphill = host.likelihood.ascent._uphill
+
+    def counted(*arguments: Any) -> Any:
+        end = uphill(*arguments)
+        asked.append(end[0].likelihood > arguments[0].likelihood)
+        return end
+
+    monkeypatch.setattr(host.likelihood.ascent, "_uphill", counted)
+    _, used, converged = ascend(point, model, FREE, 40, holds_noise=True)
+    assert converged
+    assert len(asked) == used + 1  # the one step that was taken again
+    assert not all(asked)

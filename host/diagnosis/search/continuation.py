@@ -23,6 +23,7 @@ from host.diagnosis.fits.prospects import gain, probed
 from host.diagnosis.fits.starts import idle_values, with_other_moments
 from host.diagnosis.search.candidates import candidates
 from host.dynamics.equations import NAMES
+from host.likelihood.ascent import SETTLED
 from host.likelihood.filter_error import filter_error_from
 from host.likelihood.gauss_newton import Point
 from host.likelihood.valleys import USUAL_SPEED, with_poles_swapped
@@ -46,8 +47,8 @@ FEW_STEPS, STEPS = 10, 40  # of the parameters at one stage: many lie along a ri
 SPEED = NAMES.index("u0")
 APPARENT = ("pitch_bias", "vertical_current")
 """What no free trim does where heave is not linear, nor shows at one step from a set bent without them."""
-LOST = 0.7  # of BIC a sample, to the best stage: the last ones lead nowhere
-BEHIND = 0.1  # of BIC a sample, to the best of the same stage: it leads nowhere
+BEHIND = 0.1  # of BIC a sample, to the best of the same stage, or of all stages: it leads nowhere
+ROUGHLY = 0.3  # of the log-likelihood: under slight forces, which takes longest, a smaller step is the last
 
 
 def continued(search: "Search", names: Names, most_beside: int) -> Explanation | None:
@@ -63,9 +64,9 @@ def continued(search: "Search", names: Names, most_beside: int) -> Explanation |
     least = inf  # BIC so far: the true physics gets likelier with every stage
     for share in STAGES[UNDECIDED:]:
         others = _steered(search, [_forced(fitter, at, share) for at in swapped])
-        others = _under(search, [one for one in others if _is_near(one, followed[0], BEHIND)], share, STEPS)
+        others = _under(search, [one for one in others if _is_near(one, followed[0])], share, STEPS)
         followed = _distinct([*_under(search, followed, share, STEPS), *others])[:FOLLOWED]
-        followed = [one for one in followed if _is_near(one, followed[0], BEHIND)]
+        followed = [one for one in followed if _is_near(one, followed[0])]
         followed, swapped = _moved(search, followed), []
         while followed and len(followed[0].names - common) < most_beside:
             left, lost = _left(followed[0]), followed[0].bic - least
@@ -81,7 +82,7 @@ def continued(search: "Search", names: Names, most_beside: int) -> Explanation |
             return None
         least = min(least, followed[0].bic)
         likeliest = _kept(search, followed)
-        if not _is_near(followed[0], likeliest, LOST):
+        if not _is_near(followed[0], likeliest):
             break
     best = min(followed, key=_charged)
     return fitter.explained(best.names, fitter.fitted([_forced(fitter, _at(best), 0.0)]))
@@ -167,9 +168,8 @@ def _is_same(one: Explanation, end: Explanation) -> bool:
     return one.names == end.names and is_as_likely and abs(speed - there) < SAME_SPEED * there
 
 
-def _is_near(one: Explanation, best: Explanation, most: float) -> bool:
-    """Whether it is less than so much of BIC a sample behind."""
-    return one.bic < best.bic + most * best.fit.samples
+def _is_near(one: Explanation, best: Explanation) -> bool:
+    return one.bic < best.bic + BEHIND * best.fit.samples
 
 
 def _larger(search: "Search", parent: Explanation, most: int) -> list[Explanation]:
@@ -210,9 +210,16 @@ def _steered(search: "Search", points: list[Point], steps: int = FEW_STEPS) -> l
 def _climbed(fitter: "Fitter", point: Point, steps: int) -> Explanation:
     names = point.structure.effect_names
     inputs = fitter.inputs(names, for_filter=True)
-    holds_gain = not fitter.are_slight(point.noise)
-    free = fitter.free(names)
-    fit = filter_error_from(point, inputs, free, steps, holds_noise=True, holds_gain=holds_gain)
+    free, are_slight = fitter.free(names), fitter.are_slight(point.noise)
+    fit = filter_error_from(
+        point,
+        inputs,
+        free,
+        steps,
+        holds_noise=True,
+        holds_gain=not are_slight,
+        settled=ROUGHLY if are_slight else SETTLED,
+    )
     return fitter.explained(names, fit)
 
 
