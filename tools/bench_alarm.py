@@ -10,7 +10,7 @@ import argparse
 import copy
 import sys
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -51,7 +51,7 @@ class Dive:
 
     def sample(self) -> Sample:
         """The next instant."""
-        for _ in range(round(STEP / PLANT_STEP)):
+        for _ in range(round(STEP / self.plant.step_s)):
             now = self.plant.step()
         values = {
             name: float("nan")
@@ -116,16 +116,19 @@ def scenario_of(name: str) -> Scenario:
 
 
 class Crew:
-    """The live estimator and the alarm, as `mils run` joins them."""
+    """The live estimator and the alarm, as `mils run` joins them; `alarms` is how many it raised."""
 
-    def __init__(self) -> None:
-        config = EstimatorConfig(step=STEP, speed=2.5)
+    def __init__(self, speed: float = 2.5) -> None:
+        config = EstimatorConfig(step=STEP, speed=speed)
         self.estimator = make_estimator(config)
         self.watch = MismatchWatch(MismatchConfig(), config)
+        self.alarms = 0
 
     def take(self, sample: Sample) -> Mismatch | None:
         self.estimator.update(sample)
-        return self.watch.push(sample, self.estimator.estimate() if self.watch.wants_estimate else None)
+        alarm = self.watch.push(sample, self.estimator.estimate() if self.watch.wants_estimate else None)
+        self.alarms += alarm is not None
+        return alarm
 
 
 def errors(dive: Dive, window: PredictionWindow, reference: Reference, seconds: float) -> Array:
@@ -174,10 +177,12 @@ class Strike:
     recording: Recording | None = None
 
 
-def strike(name: str, seed: int, records: bool = False) -> Iterator[Strike]:
-    """Each fault in one sea."""
+def strike(
+    dive: Dive, crew: Crew, faults: Mapping[str, Fault] = FAULTS, records: bool = False
+) -> Iterator[Strike]:
+    """Each fault in one dive."""
     past: deque[Sample] = deque(maxlen=round(LONGEST_SIDE / STEP))
-    dive, crew, window = Dive(scenario_of(name), seed), Crew(), PredictionWindow(round(HORIZON / STEP), STEP)
+    window = PredictionWindow(round(HORIZON / STEP), STEP)
     found = []
     for k in range(round(ONSET / STEP)):
         sample = dive.sample()
@@ -189,9 +194,9 @@ def strike(name: str, seed: int, records: bool = False) -> Iterator[Strike]:
             found.append(window.errors(reference, LEVELS))
     reference = crew.watch.reference
     if reference is None or not found:
-        raise SystemExit(f"{name} {seed}: nothing was learnt before the fault")
+        raise SystemExit(f"nothing was learnt in {ONSET:g} s before the fault")
     usual = np.sqrt(np.mean(np.square(found), axis=0))
-    for title, fault in FAULTS.items():
+    for title, fault in faults.items():
         size = size_of(fault, dive, window, reference, usual)
         if size is None:
             yield Strike(title=title)
@@ -264,7 +269,7 @@ def main() -> int:
         named: dict[str, int] = dict.fromkeys(FAULTS, 0)
         invisible = 0
         for seed in range(args.seed, args.seed + args.seas):
-            for struck in strike(name, seed, args.diagnose):
+            for struck in strike(Dive(scenario_of(name), seed), Crew(), records=args.diagnose):
                 title, size, delay, alarm = struck.title, struck.size, struck.delay, struck.alarm
                 if size is None:
                     invisible += 1

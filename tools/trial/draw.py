@@ -83,7 +83,7 @@ def _attempt(
     )
     native = (draw_servo(rng, setting),) if fleet == "published" else ()
     try:
-        outing, plain = _sized_to_pitch(rng, outing, seed, setting, native)
+        outing, plain = sized_to_pitch(rng, outing, seed, setting, native)
     except ScenarioError:
         return None
     setting = replace(
@@ -118,7 +118,7 @@ def _attempt(
     return _of_published(drawn, name) if fleet == "published" else drawn
 
 
-def _sized_to_pitch(
+def sized_to_pitch(
     rng: np.random.Generator, outing: Outing, seed: int, setting: Setting, native: tuple[Hidden, ...]
 ) -> tuple[Outing, Voyage]:
     """The plane's amplitude set for a drawn largest pitch, and the run with nothing hidden."""
