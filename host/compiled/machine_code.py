@@ -1,8 +1,4 @@
-"""Machine code, where the computer has a C compiler.
-
-CasADi goes through a function's instructions one by one, which takes ten times as long as what a compiler
-makes of them. It is the same operations in the same order, so the results have the same bits.
-"""
+"""Machine code, where the computer has a C compiler."""
 
 import ctypes
 import os
@@ -13,8 +9,6 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TypeVar
-
-import casadi as ca
 
 from host.compiled.library_shelf import keep, place_of
 
@@ -89,10 +83,3 @@ def _made_by(
         if place is not None:
             keep(library, place)
         return made
-
-
-def as_machine_code(function: ca.Function, is_kept: bool = False) -> ca.Function | None:
-    """The same function compiled, or None; with `is_kept` only if it was compiled before."""
-    generator = ca.CodeGenerator("function")
-    generator.add(function)
-    return compiled(generator.dump(), lambda library: ca.external(function.name(), library), is_kept=is_kept)

@@ -174,6 +174,9 @@ class Structure:
 
     effects: tuple[Effect, ...] = ()
 
+    def __hash__(self) -> int:
+        return hash(self.effect_names)  # of all that an effect is, it would take as long as a short run
+
     @cached_property
     def effect_names(self) -> frozenset[str]:
         return frozenset(effect.name for effect in self.effects)
@@ -188,7 +191,13 @@ class Structure:
 
     def clipped(self, parameters: Array) -> Array:
         """The parameters (n,) within their bounds."""
-        return np.clip(parameters, [p.lower for p in self.parameters], [p.upper for p in self.parameters])
+        return np.clip(parameters, *self.bounds)
+
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """The least and the largest value of each parameter (n,)."""
+        limits = np.array([(p.lower, p.upper) for p in self.parameters], dtype=float)
+        return limits[:, 0].copy(), limits[:, 1].copy()
 
     @cached_property
     def moments(self) -> frozenset[str]:

@@ -8,6 +8,7 @@ resolution.
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -231,12 +232,29 @@ def _followed(form: Form, of: Callable[[Chain], ca.SX]) -> ca.Function:
 
 
 @lru_cache(KEPT)
-def _initial(form: Form) -> ca.Function:
-    """All states at the first row, and their derivatives by the parameters and what a run begins with."""
+def _initial(form: Form) -> Callable[[Array, Array, Array], Array]:
+    """All states at the first row, and their derivatives by the parameters and what a run begins with.
+
+    Side by side, (nx, 1 + parameters + 5), from what it begins with, the parameters and the first row.
+    """
     x0, (_, p, drive) = ca.SX.sym("x0", NX0), form.symbols()
     x = form.structure.initial(x0, p, drive)
-    slopes = ca.horzcat(ca.jacobian(x, p), ca.jacobian(x, x0))
-    return ca.Function("initial", [x0, p, drive], [x, slopes])
+    table = ca.densify(ca.horzcat(x, ca.jacobian(x, p), ca.jacobian(x, x0)))
+    function = ca.Function("initial", [x0, p, drive], [table])
+
+    def run(*given: Array) -> Array:
+        # In place, as in host.compiled.over_rows: CasADi's own matrices would take longer than all else.
+        columns = np.empty(table.shape[::-1])
+        buffer: Any
+        buffer, evaluate = function.buffer()
+        kept = [np.ascontiguousarray(one, dtype=float) for one in given]
+        for place, one in enumerate(kept):
+            buffer.set_arg(place, one.data)
+        buffer.set_res(0, columns.data)
+        evaluate()
+        return columns.T
+
+    return run
 
 
 @lru_cache(KEPT)
@@ -258,9 +276,9 @@ def begun_at(pitch: float, depth: float) -> Array:
 
 def start_of(form: Form, parameters: Array, initial: Array, inputs: Inputs) -> tuple[Array, Array]:
     """All states at the first row (nx,), and their derivatives by the parameters and by `initial` (5,)."""
-    x, slopes = _initial(form)(initial, inputs.widened(parameters), inputs.drive[:, 0])
-    columns = [*inputs.own, *range(form.np, form.np + NX0)]
-    return np.asarray(x, dtype=float).ravel(), np.asarray(slopes, dtype=float)[:, columns]
+    table = _initial(form)(initial, inputs.widened(parameters), inputs.drive[:, 0])
+    own = [*inputs.own, *range(form.np, form.np + NX0)]
+    return table[:, 0].copy(), table[:, 1:][:, own]
 
 
 @dataclass(frozen=True, slots=True)

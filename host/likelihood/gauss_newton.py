@@ -78,6 +78,7 @@ class GaussNewton:
         count = int(self.free.sum())
         self.H, self.g = np.zeros((count, count)), np.zeros(count)
         self.own: list[tuple[Array, Array, Array]] = []
+        self._eliminated: tuple[Array, Array] | None = None  # once asked
         for (H, g), x0 in zip(normal, self.point.initial, strict=True):
             self.H += H[:count, :count]
             self.g += g[:count]
@@ -161,18 +162,19 @@ class GaussNewton:
 
     def _reduced(self) -> tuple[Array, Array]:
         """Normal matrix and right-hand side of the free parameters, the initial states eliminated."""
-        rhs = self.g.copy()
-        with np.errstate(all="ignore"):
-            for Hpx, Hxx, gx in self.own:
-                rhs -= Hpx @ np.linalg.solve(Hxx, gx)
-        return self.information(), rhs
+        if self._eliminated is None:
+            rhs = self.g.copy()
+            with np.errstate(all="ignore"):
+                for Hpx, Hxx, gx in self.own:
+                    rhs -= Hpx @ np.linalg.solve(Hxx, gx)
+            self._eliminated = self.information(), rhs
+        return self._eliminated
 
     def _reached(self, reduced: Array, rhs: Array, damping: float, scale: Array) -> Array:
         """Free parameters after a damped step; what would leave its bounds stops there, others suit that."""
         normal = reduced / np.outer(scale, scale) + damping * np.eye(scale.size)
-        bounds, here = self.point.structure.parameters, self.point.parameters[self.free]
-        lower = np.array([p.lower for p in bounds])[self.free]
-        upper = np.array([p.upper for p in bounds])[self.free]
+        lower, upper = (bound[self.free] for bound in self.point.structure.bounds)
+        here = self.point.parameters[self.free]
         reached, inside = here.copy(), np.ones(scale.size, dtype=bool)
         while inside.any():
             stopped = ((reached - here) * scale)[~inside]

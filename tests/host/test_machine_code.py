@@ -9,7 +9,7 @@ from exact_dive import TABLE_1, Dive, fly
 
 from host.catalogue import BY_NAME
 from host.compiled import library_shelf, machine_code, over_rows
-from host.compiled.machine_code import as_machine_code
+from host.compiled.row_loop import Loop, as_loop
 from host.dynamics.equations import Structure
 from host.dynamics.propagate import free_run, inputs_of
 from host.likelihood.kalman import kalman_pass
@@ -61,11 +61,11 @@ def test_compiled_runs_have_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(over_rows, "FEW_INSTRUCTIONS", 1.0)
     compiled: list[str] = []
 
-    def watched(function: ca.Function, is_kept: bool = False) -> ca.Function | None:
-        compiled.extend([function.name()] * (not is_kept))
-        return as_machine_code(function, is_kept)
+    def watched(step: ca.Function, is_kept: bool = False) -> Loop | None:
+        compiled.extend([step.name()] * (not is_kept))
+        return as_loop(step, is_kept)
 
-    monkeypatch.setattr(over_rows, "as_machine_code", watched)
+    monkeypatch.setattr(over_rows, "as_loop", watched)
     for _ in range(2):
         for expected, found in zip(interpreted, passes(), strict=True):
             np.testing.assert_array_equal(found, expected)
@@ -73,17 +73,29 @@ def test_compiled_runs_have_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> No
     over_rows._carried_on.cache_clear()
 
 
+def times(factor: float) -> ca.Function:
+    """A step that grows by a factor and what drives it; gives what it was, with the parameters."""
+    x, driven, p = ca.SX.sym("x"), ca.SX.sym("driven"), ca.SX.sym("p", 2)
+    return ca.Function("times", [x, driven, p], [factor * x + driven, ca.vertcat(x, ca.sin(p[0]) * p[1])])
+
+
+def runs_three_rows(loop: Loop | None, factor: float) -> None:
+    assert loop is not None
+    found = loop(np.array([1.0]), np.array([[0.0], [0.5], [0.0]]), np.array([1.0, 2.0]))
+    second = np.sin(1.0) * 2.0
+    expected = [[1.0, second], [factor, second], [factor**2 + 0.5, second]]
+    np.testing.assert_array_equal(found, expected)
+
+
 def test_without_a_compiler_there_is_no_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
     with_a_compiler(None, monkeypatch)
-    x = ca.SX.sym("x")
-    assert as_machine_code(ca.Function("twice", [x], [2.0 * x])) is None
+    assert as_loop(times(2.0)) is None
 
 
 @pytest.mark.parametrize("name", ["false", "gone"])
 def test_a_compiler_that_does_not_work_is_none(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     with_a_compiler(shutil.which(name) or str(Path("/") / name), monkeypatch)
-    x = ca.SX.sym("x")
-    assert as_machine_code(ca.Function("twice", [x], [2.0 * x])) is None
+    assert as_loop(times(2.0)) is None
 
 
 @pytest.mark.parametrize(
@@ -102,38 +114,27 @@ def test_a_compiler_counts_only_if_it_works(
 
 
 @needs_compiler
-def test_a_compiled_function_outlives_its_file() -> None:
-    x, y = ca.SX.sym("x", 2), ca.SX.sym("y")
-    function = ca.Function("both", [x, y], [x * y, ca.sin(x[0]) + y])
-    compiled = as_machine_code(function)
-    assert compiled is not None
-    for found, expected in zip(compiled([1.0, 2.0], 3.0), function([1.0, 2.0], 3.0), strict=True):
-        np.testing.assert_array_equal(np.array(found), np.array(expected))
+def test_a_compiled_loop_outlives_its_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(library_shelf, "folder", lambda: None)
+    runs_three_rows(as_loop(times(2.0)), 2.0)
 
 
 @needs_compiler
 def test_what_was_compiled_once_is_not_compiled_again(shelf: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    x = ca.SX.sym("x")
-    function = ca.Function("twice", [x], [2.0 * x])
-    assert as_machine_code(function, is_kept=True) is None
-    assert as_machine_code(function) is not None
+    assert as_loop(times(2.0), is_kept=True) is None
+    assert as_loop(times(2.0)) is not None
     assert len([*shelf.iterdir()]) == 1
     monkeypatch.setattr(machine_code, "_made_by", lambda *_: pytest.fail("compiled again"))
-    kept = as_machine_code(function, is_kept=True)
-    assert kept is not None
-    assert float(kept(3.0)) == 6.0
-    assert as_machine_code(ca.Function("twice", [x], [2.5 * x]), is_kept=True) is None
+    runs_three_rows(as_loop(times(2.0), is_kept=True), 2.0)
+    assert as_loop(times(2.5), is_kept=True) is None
 
 
 @needs_compiler
 def test_a_library_that_is_damaged_is_compiled_anew(shelf: Path) -> None:
-    x = ca.SX.sym("x")
-    function = ca.Function("twice", [x], [2.0 * x])
-    as_machine_code(function)
+    as_loop(times(2.0))
     (place,) = shelf.iterdir()
+    place.unlink()  # not written over: this process has loaded it
     place.write_bytes(b"half of it")
-    assert as_machine_code(function, is_kept=True) is None
+    assert as_loop(times(2.0), is_kept=True) is None
     assert not place.exists()
-    found = as_machine_code(function)
-    assert found is not None
-    assert float(found(3.0)) == 6.0
+    runs_three_rows(as_loop(times(2.0)), 2.0)
