@@ -16,6 +16,7 @@ from host.diagnosis.disturbances.seas import (
     in_a_sea,
     in_plain_waves,
     led_astray,
+    left_among,
 )
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
@@ -97,13 +98,17 @@ def explain(
             return swung
         if part is None or part.waves is not None:
             search, best, told = among_waves(search, best, calm)
-        left = leftover(fitter, best if told is None else told.fitted)
+        left = leftover(fitter, best) if told is None else left_among(fitter, told)
         if told is None and not left.is_by_speed:
             drift = drift or among_drift(search, best)
             if drift is not None and drift.best.bic < as_filtered(fitter, best).bic - NAMING_MARGIN:
                 return drift
     if told is None and (lean := leanest(search, best)) is not best:
         best, left = lean, leftover(fitter, lean)
+    if told is None and best.fit.has_process_noise and left.is_nothing and not left.is_by_speed:
+        grown = with_unknown(search, best)  # forces large enough for it take anything for noise
+        if unknown_in(grown):
+            best, left = grown, leftover(fitter, grown)
     return Explained(best, search, left, told)
 
 

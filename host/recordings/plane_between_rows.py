@@ -69,8 +69,12 @@ def ways_between(recordings: list[Recording]) -> list[list[Recording]]:
 
 
 def _counts(plane: PlaneReadings) -> bool:
-    """Whether its readings count in place of the rows: of a plane that steps only where most have none."""
-    return plane.is_slow or not plane.is_stepping
+    """Whether its readings count in place of the rows: of a plane that steps only where most have none.
+
+    What is doubtful only counts where the moments of its steps are estimated (host.diagnosis.plane_moments):
+    that it always stepped halfway may be as likely as a delay.
+    """
+    return not plane.is_doubtful and (plane.is_slow or not plane.is_stepping)
 
 
 def _from_row_to_row(recording: Recording) -> Recording:

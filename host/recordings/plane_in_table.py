@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from host.recordings.plane_readings import UNSEEN, PlaneReadings
 from host.recordings.recording import Array
 
-LONGEST_HELD = 0.6  # s: a plane that repeats its angle for longer was told to
+LONGEST_HELD = 0.6  # s: a plane that repeats its angle for longer may have been told to
+LONGEST_PACE = 2.5  # s: nor does any logger take longer
 FEWEST_TURNS = 20  # that tell a logger's pace from the plane's own
 ROUNDED = 0.02  # of the sharpest bend: what lines seem to bend where their points are rounded
 ON_A_ROW = 0.1  # of a step
@@ -22,7 +23,9 @@ def plane_readings(time: Array, rudder: Array, step: float) -> PlaneReadings | N
     rows = known[_read(time[known], rudder[known], step)]
     if rows.size < 2 or not (np.diff(time[rows]) > UNSEEN * step).any():
         return None
-    return PlaneReadings(time[rows], rudder[rows], step, pace=step)
+    is_doubtful = rows.size < known.size and bool(np.median(np.diff(time[rows])) > LONGEST_HELD)
+    found = PlaneReadings(time[rows], rudder[rows], step, pace=step, is_doubtful=is_doubtful)
+    return None if is_doubtful and not found.is_stepping else found
 
 
 def _read(time: Array, rudder: Array, step: float) -> NDArray[np.bool_]:
@@ -44,6 +47,6 @@ def _every_few(time: Array, turns: NDArray[np.intp], step: float) -> NDArray[np.
     if np.abs(places - np.rint(places))[turns].max() > ON_A_ROW:
         return None
     every = int(np.gcd.reduce(np.rint(places[turns]).astype(int)))
-    if every < 2 or every * step > LONGEST_HELD:
+    if every < 2 or every * step > LONGEST_PACE:
         return None
     return np.asarray(np.rint(places).astype(int) % every == 0)

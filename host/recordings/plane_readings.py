@@ -42,12 +42,14 @@ class PlaneReadings:
     angle  rad (K,)
     step   s, of the recording's rows
     pace   s, of the instants at which it may have stepped; 0 for any
+    is_doubtful  each row may have a reading: one told to step at this pace leaves the same table
     """
 
     time: Array
     angle: Array
     step: float
     pace: float = 0.0
+    is_doubtful: bool = False
 
     @property
     def is_slow(self) -> bool:

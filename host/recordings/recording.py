@@ -95,7 +95,7 @@ def split_at_gaps(
     needed channel, are dropped.
     """
     longest_unread = longest_hold
-    if recording.plane is not None:
+    if recording.plane is not None and not recording.plane.is_doubtful:
         longest_unread = max(longest_hold, USUAL_GAPS * float(np.median(np.diff(recording.plane.time))))
     known = np.isfinite(recording.rudder)
     rows = np.arange(recording.time.size)

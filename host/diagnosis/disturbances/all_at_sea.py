@@ -7,6 +7,7 @@ from host.diagnosis.disturbances.seas import (
     Explained,
     Waves,
     beside_own_waves,
+    left_among,
     search_among,
     searched_among,
     told_waves,
@@ -14,7 +15,7 @@ from host.diagnosis.disturbances.seas import (
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.leftover import leftover
-from host.diagnosis.fits.margins import margin
+from host.diagnosis.fits.margins import NAMING_MARGIN, margin
 from host.diagnosis.fits.prospects import form_gains
 from host.diagnosis.fits.sea_fits import again_in_waves, with_sea
 from host.diagnosis.fits.workers import Workers
@@ -25,7 +26,8 @@ from host.diagnosis.search.whole_vehicle import is_real
 def in_a_swell(calm: Search, swell: Explanation) -> Explained | None:
     """The search from all that every vehicle has among waves estimated beside it; None if few of it pay.
 
-    Or if something is left: as no search without waves was made, nothing speaks for them then.
+    Or if something is left, or waves are no likelier than white forces: as no search without them was made,
+    nothing speaks for them then.
     """
     fitter = calm.fitter
     search = search_among(calm, swell)
@@ -33,9 +35,10 @@ def in_a_swell(calm: Search, swell: Explanation) -> Explained | None:
     if not is_real(found.names):
         return None
     found, fitted = beside_own_waves(search, swell, found)
-    left = leftover(fitter, fitted)
     told = told_waves(fitter, fitted, with_sea(fitter, fitted).bic - fitted.bic)
-    return Explained(found, search, left, told, is_of_all=True) if left.is_nothing else None
+    left = left_among(fitter, told)
+    is_enough = left.is_nothing and told.delta_bic > NAMING_MARGIN
+    return Explained(found, search, left, told, is_of_all=True) if is_enough else None
 
 
 def again_in_a_swell(

@@ -16,6 +16,7 @@ from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.leftover import Leftover, leftover
 from host.diagnosis.fits.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, ROUGH, margin
+from host.diagnosis.fits.prospects import form_gains
 from host.diagnosis.fits.sea_fits import (
     WAVES,
     again_under_forces,
@@ -155,7 +156,7 @@ def in_plain_waves(calm: Search, waves: Explanation) -> Explained:
     Where something is left then, what is hidden may only pass for waves.
     """
     search, found, told = searched_among(calm, waves, as_filtered(calm.fitter, calm.root).bic)
-    return Explained(found, search, leftover(calm.fitter, told.fitted), told)
+    return Explained(found, search, left_among(calm.fitter, told), told)
 
 
 def against(plain: Explained, waves: Explanation, best: Explanation) -> Explained | None:
@@ -267,6 +268,17 @@ def beside_own_waves(
     for name in sorted(found.names - fitted.names):
         found = search.without(found, name)
     return found, fitted
+
+
+def left_among(fitter: Fitter, waves: Waves) -> Leftover:
+    """What is left among waves: smooth as well where a form of unknown physics gains beside them.
+
+    Waves large enough for it take anything for chance. What swings as they do is no sign.
+    """
+    left = leftover(fitter, waves.fitted)
+    gains = form_gains(fitter, waves.fitted)
+    del gains[SWINGING_MOMENT.name]
+    return replace(left, is_smooth=left.is_smooth or max(gains.values()) > margin(waves.fitted))
 
 
 def told_waves(fitter: Fitter, fitted: Explanation, worth: float) -> Waves:
