@@ -179,3 +179,24 @@ def test_what_wanders_is_not_excused_by_errors_of_the_speed(
     monkeypatch.setattr(Search, "is_pushed_about", False)
     answer, _ = explained(monkeypatch, ORDINARY_SET, left=lefts, led=("at sea", by_speed))
     assert (answer.best is by_speed) is is_led
+
+
+@pytest.mark.parametrize(
+    ("left_among_forces", "is_by_speed", "is_asked"),
+    [(NOTHING, False, True), (MUCH_LEFT, False, False), (NOTHING, True, False)],
+    ids=["nothing is left", "something is", "errors of the speed"],
+)
+def test_forms_are_asked_again_beside_forces_that_leave_nothing(
+    left_among_forces: Any, is_by_speed: bool, is_asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    forced = explanation(frozenset({"munk_moment"}), has_process_noise=True)
+    grown = explanation(forced.names | {"unknown_plane_abs_delta"}, has_process_noise=True)
+    monkeypatch.setattr(module, "with_unknown", lambda _, best: grown if best is forced else best)
+    monkeypatch.setattr(module, "in_a_sea", lambda search, _: (search, forced))
+    monkeypatch.setattr(module, "among_waves", lambda search, best, _: (search, best, None))
+    monkeypatch.setattr(module, "among_drift", lambda *_: None)
+    monkeypatch.setattr(module, "as_filtered", lambda _, one: one)
+    told = SimpleNamespace(is_nothing=left_among_forces.is_nothing, is_by_speed=is_by_speed)
+    lefts = iter([MUCH_LEFT, MUCH_LEFT, *[told] * 3])
+    answer, _ = explained(monkeypatch, ORDINARY_SET, left=lefts)
+    assert answer.best is (grown if is_asked else forced)

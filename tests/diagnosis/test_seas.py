@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hidden_dive import Extra, hidden_dive
+from hidden_dive import BASE, Extra, hidden_dive
 
 from host.catalogue import ORDINARY, structure_of
 from host.diagnosis.diagnose import _judge, _unnamed, diagnose
@@ -18,6 +18,8 @@ from host.diagnosis.disturbances.seas import (
     among_waves,
     explains_more,
     in_plain_waves,
+    left_among,
+    told_waves,
 )
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
@@ -126,6 +128,16 @@ def test_what_only_passes_for_waves_is_none(monkeypatch: pytest.MonkeyPatch) -> 
         doubtful = in_plain_waves(calm, waves)
         assert not doubtful.left.is_nothing  # something else is left among them
     assert plain_waves(Fitter([hidden_dive(duration=60.0)])) is None
+
+
+@pytest.mark.parametrize("beyond", [0.0, 0.3])
+def test_waves_hide_no_plane_that_bites_better_one_way(beyond: float) -> None:
+    def one_sided(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+        return BASE["b1"] * beyond * abs(plane), BASE["b2"] * beyond * abs(plane), 0.0
+
+    fitter = Fitter([hidden_dive(in_waves(one_sided, 0.02, 0.06), duration=60.0)])
+    waves = told_waves(fitter, with_waves(fitter, with_sea(fitter, fitter.root)), 100.0)
+    assert left_among(fitter, waves).is_smooth == (beyond > 0.0)
 
 
 def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -120,6 +120,9 @@ def test_the_search_among_waves_begins_with_all_of_it(
         assert told.best.names == kept.names
         assert told.left.is_nothing
         assert told.waves.delta_bic > 100.0  # white forces in the place of the waves are far less likely
+        with monkeypatch.context() as likely:
+            likely.setattr(all_at_sea, "with_sea", lambda _, fitted: fitted)
+            assert in_a_swell(calm, swell) is None  # where they were as likely, no waves
         monkeypatch.setattr(Search, "run_from", lambda *_: fitter.reduced(swell, few))
         assert in_a_swell(calm, swell) is None
 

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from host.recordings.csv_map import CsvMap
 from host.recordings.csv_recording import read_csv_recording
-from host.recordings.plane_between_rows import between_readings, with_moving_plane
+from host.recordings.plane_between_rows import between_readings, ways_between, with_moving_plane
 from host.recordings.plane_in_table import plane_readings
 from host.recordings.plane_readings import PlaneReadings
-from host.recordings.recording import Array
+from host.recordings.recording import Array, Recording
 
 STEP = 0.1
 TIME = STEP * np.arange(400)
@@ -50,6 +50,22 @@ def test_a_table_with_a_reading_in_each_row_has_none_between() -> None:
     assert plane_readings(TIME, stepping(), STEP) is None
     pulses = np.where(TIME % 6.0 < 3.0, 0.1, -0.1)  # told so seldom that nothing tells a logger's pace
     assert plane_readings(TIME, pulses, STEP) is None
+
+
+def test_a_step_at_every_second_may_be_a_logger_s_or_the_plane_s_own() -> None:
+    time = STEP * np.arange(2000)
+    steps = 0.1 * np.random.default_rng(5).integers(-1, 2, 200).repeat(10)
+    plane = plane_readings(time, steps, STEP)
+    assert plane is not None
+    assert plane.is_doubtful
+    assert plane.time == pytest.approx(time[::10])
+    still = dict.fromkeys(("depth", "pitch", "speed", "pitch_rate"), time)
+    recording = Recording(name="dive", sha256="", time=time, rudder=steps, step=STEP, plane=plane, **still)
+    assert len(ways_between([recording])) == 1  # nothing else is made of it than what the rows say
+    swinging = np.sin(0.1 * np.arange(200)).repeat(10)
+    assert plane_readings(time, swinging, STEP) is None  # no step that might have come earlier
+    pulses = 0.1 * (-1.0) ** (np.arange(2000) // 30)
+    assert plane_readings(time, pulses, STEP) is None  # a logger as slow as that is none
 
 
 def test_where_rows_are_lost_only_what_happened_there_is_unseen() -> None:
