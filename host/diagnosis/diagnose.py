@@ -32,7 +32,7 @@ from host.diagnosis.search.search import Search
 from host.diagnosis.search.unknown_physics import known_in
 from host.diagnosis.search.whole_vehicle import beside_all, in_the_valley_of, widened
 from host.dynamics.equations import NAMES, Slot
-from host.identification.identifiability import ambiguity
+from host.identification.identifiability import ambiguity, left_open
 from host.noise.noise_floor import noise_floor
 from host.recordings.consistency import check_signs, units_note
 from host.recordings.outliers import without_outliers
@@ -183,6 +183,8 @@ def _diagnosed(
     alone = max(_ranking(search), ranking, key=len)
     is_ranked_alone = len(alone) >= len(effects)
     told = remaining(judged.verdict, best, left, judged.after, evidence(waves))
+    stds = np.array([std.get(name, 0.0) for name in NAMES])
+    hardly = [left_open(found.fit.parameters, stds)] * (judged.verdict == "no_mismatch")
     return Diagnosis(
         verdict=judged.verdict,
         recordings=recordings,
@@ -199,7 +201,7 @@ def _diagnosed(
         force=unknown_force(longest, {n: values[n] for n in NAMES}, floor, fitter.accelerations),
         ranking=alone if is_ranked_alone else [(effect.name, effect.delta_bic) for effect in effects],
         is_ranked_alone=is_ranked_alone,
-        remaining=" ".join([told, *_unnamed(best, waves), *_other_answers(found)]),
+        remaining=" ".join(filter(None, [told, *_unnamed(best, waves), *(_other_answers(found) or hardly)])),
         has_sea=best.fit.has_process_noise,
         bic=best.bic,
         std=std,

@@ -59,6 +59,16 @@ def undetermined(parameters: Array, covariance: Array, free: Mask) -> list[str]:
     return [name for name in JUDGED if free[NAMES.index(name)] and std[NAMES.index(name)] > worthless[name]]
 
 
+def left_open(parameters: Array, stds: Array) -> str:
+    """A sentence about parameters that a recording in which nothing is missing does not tell; else empty."""
+    if not (names := undetermined(parameters, np.diag(stds**2), stds > 0.0)):
+        return ""
+    return (
+        f"But it leaves {', '.join(names)} open, so that what is missing there might not show. "
+        f"To decide: {_telling_apart(set(names))}."
+    )
+
+
 def open_combinations(parameters: Array, covariance: Array, free: Mask) -> list[Combination]:
     """The combinations of two parameters and more that the recording leaves open, the worst first."""
     names = [name for name in JUDGED if free[NAMES.index(name)]]

@@ -8,7 +8,7 @@ from exact_dive import TABLE_1, Dive, fly
 
 from host.dynamics.equations import BASE, NAMES
 from host.dynamics.propagate import inputs_of
-from host.identification.identifiability import ambiguity, open_combinations, undetermined
+from host.identification.identifiability import ambiguity, left_open, open_combinations, undetermined
 from host.identification.identify import identify
 from host.identification.uncertainty import covariance, covariance_within
 from host.likelihood.gauss_newton import Point
@@ -105,3 +105,14 @@ def test_a_coefficient_at_the_edge_of_the_possible_is_told() -> None:
     assert not any(
         note.startswith("At the edge") for note in identify([fly(Dive())[0]], default_vehicle()).notes
     )
+
+
+def test_what_a_recording_without_motion_leaves_open_is_said() -> None:
+    known = np.array([-1.0, -2.0, -3.0, 0.5, -1.5, 1.5, 0.0, 0.0])
+    stds = 0.01 * np.abs(known)
+    assert left_open(known, stds) == ""
+    stds[0] = 0.6
+    assert "leaves a1 open" in left_open(known, stds)
+    assert "plane steps of 1 to 8 s" in left_open(known, stds)
+    stds[5] = 1.0
+    assert "leaves a1, u0 open" in left_open(known, stds)
