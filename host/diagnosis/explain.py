@@ -25,6 +25,7 @@ from host.diagnosis.fits.margins import LARGEST_SET, LITTLE, NAMING_MARGIN
 from host.diagnosis.fits.sea_fits import as_filtered
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.plane_choice import Way
+from host.diagnosis.search.damping_forms import with_drags_instead
 from host.diagnosis.search.pruning import leanest
 from host.diagnosis.search.rarity import told_by_the_usual
 from host.diagnosis.search.search import Search
@@ -103,7 +104,7 @@ def explain(
             drift = drift or among_drift(search, best)
             if drift is not None and drift.best.bic < as_filtered(fitter, best).bic - NAMING_MARGIN:
                 return drift
-    if told is None and (lean := leanest(search, best)) is not best:
+    if told is None and (lean := leanest(search, with_drags_instead(search, best))) is not best:
         best, left = lean, leftover(fitter, lean)
     if told is None and best.fit.has_process_noise and left.is_nothing and not left.is_by_speed:
         grown = with_unknown(search, best)  # forces large enough for it take anything for noise

@@ -41,6 +41,7 @@ MOST_ROUNDS = 15
 SHARES = (1.0, 0.5, 0.2)  # of a step, until it leads down
 SLIGHT = 2.0  # of a deviance: less is not worth another round
 SHIFT = 0.1  # of the time between two readings, over which a difference is taken
+SCATTERED = 0.15  # deviation of moments from one another: half that of any from 0 to 1
 TINY = 1e-9  # of a moment, so that its bounds lie apart
 RIDGE = 1e-9  # of the information: what two coefficients do alike
 
@@ -73,7 +74,8 @@ def with_plane_moments(
 ) -> list[Recording]:
     """The recordings with the plane's steps at their likeliest moments between its readings.
 
-    As they are where each row has its own reading, or a plane that held until the next is about as likely.
+    As they are where each row has its own reading, or may have and the steps are all as late after one; and
+    where a plane that held until the next is about as likely.
     """
     unseen = UnseenSteps(recordings)
     if not unseen.steps:
@@ -94,6 +96,8 @@ def with_plane_moments(
         best, charge = on_rows, theirs - on_rows.cost
     if best.cost + charge > -2.0 * held.fit.log_likelihood - NAMING_MARGIN:
         return recordings
+    if unseen.are_doubtful and best.moments.std() < SCATTERED:
+        return recordings  # each as late as the others: the plane's own steps, and a delay that is lacking
     return _with_doubt(unseen, best)
 
 

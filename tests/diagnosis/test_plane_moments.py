@@ -60,6 +60,16 @@ def test_a_plane_that_is_told_when_it_is_read_holds_until_then() -> None:
     assert with_plane_moments(told) is told
 
 
+def test_where_each_row_may_have_a_reading_moments_must_differ(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = read_every(hidden_dive(), 5)
+    assert seen.plane is not None
+    doubtful = [replace(seen, plane=replace(seen.plane, is_doubtful=True))]
+    (moved,) = with_plane_moments(doubtful)
+    assert moved.plane_doubt is not None
+    monkeypatch.setattr(plane_moments, "SCATTERED", 0.4)  # more than moments anywhere from 0 to 1 do
+    assert with_plane_moments(doubtful) is doubtful
+
+
 def test_where_the_vehicle_runs_away_no_step_leads_anywhere(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = [read_every(hidden_dive(duration=40.0), 5)]
     nothing = [(np.zeros((2, 3)), np.full((2, 40, 3), np.inf), np.full((2, 9, 3), np.nan))]

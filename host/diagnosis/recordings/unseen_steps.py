@@ -18,6 +18,7 @@ class UnseenSteps:
     steps     the recording of each, and its place among the steps of that
     mean, variance  of their moments (J,), before anything is known of them
     rows      at how many instants each may have been; nan where at any
+    are_doubtful  whether the plane may have been told to step where it was read
     """
 
     def __init__(self, recordings: list[Recording]) -> None:
@@ -31,6 +32,7 @@ class UnseenSteps:
         }
         most = min(MOST_STEPS, MOST_VALUES // sum(one.time.size for one in recordings))
         self.steps = sorted(sorted(sizes, key=lambda step: -sizes[step])[:most])
+        self.are_doubtful = any(self._plane(i).is_doubtful for i, _ in self.steps)
         self.mean = np.array([self._plane(i).mean_moments[k] for i, k in self.steps])
         self.variance = np.array([self._plane(i).moment_variances[k] for i, k in self.steps])
 
