@@ -256,3 +256,4 @@ def test_forces_that_push_a_hull_and_do_not_turn_it_are_no_sea(
     assert verdict_on(best, left, misfit(40.0), misfit(20.0)) == verdict
     said = remaining(verdict, best, left, misfit(20.0))
     assert ("do not turn it" in said) == (verdict == "partly_explained")
+    assert ("astray, pitch by 4.5 times" in said) == (verdict == "explained" and not is_by_speed)

@@ -229,7 +229,11 @@ def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfi
     worst = "depth" if after.chi2_depth > after.chi2_pitch else "pitch"
     size = max(after.chi2_depth, after.chi2_pitch) ** 0.5
     if verdict == "explained" and sea:
-        return sea.strip()
+        is_astray = best.fit.has_process_noise and not left.is_by_speed and after.chi2 > WORSE
+        astray = (
+            f" They lead a free run over what was held out astray, {worst} by {size:.1f} times its noise."
+        )
+        return (sea + astray * is_astray).strip()
     if verdict == "explained" and after.chi2 > WORSE:
         return (
             "Where it was learnt, what is left is as small as the sensors' own noise; on stretches that were "
