@@ -268,7 +268,9 @@ def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfi
         if size >= MORE_THAN_NOISE
         else "hardly more than its sensor noise"
     )
-    return f"{begin} {worst} is still off by {off} {run}; {kind}.{forms}" + sea
+    if forms:
+        begin = f"Physics is at work that the catalogue does not hold.{forms} Beside it"
+    return f"{begin} {worst} is still off by {off} {run}; {kind}." + sea
 
 
 def _drift(wander: Array) -> str:
