@@ -35,6 +35,8 @@ from host.recordings.recording import Array
 
 SLOWEST = 0.2  # rad/s; slower is current
 BROADEST = 0.4  # of a sea: 0.26 fits the waves of a fully developed one, 0.1 those of a young one
+MOST_TURN = 4.0  # s/m, of turning over the slope's velocity: deep water gives s / g, hulls came to 1.1
+SHOWN = 0.3  # of the depth's noise, that a swing exceeds which shows within a hundred rows
 FIRST_DAMPING = 0.1
 DAMPINGS = (0.02, 0.05)  # to begin with where the innovations swing: weak waves show in a narrow band only
 FREQUENCIES = np.geomspace(0.3, 4.0, 10)  # rad/s, to begin with; each is within the band of the next
@@ -176,11 +178,23 @@ def in_waves_from(
 def is_sea(fit: Fit) -> bool:
     """Whether a fit's waves have a period of surface waves, in a band no broader than a sea's.
 
+    And whether the water rises as much as it must to turn the vehicle so, where the depth would show that.
     A fit that ran away has none: its frequency is 0.
     """
     frequency, damping = fit.waves[:2]
     shortest, longest = WAVE_PERIODS
-    return bool(2.0 * np.pi / longest < frequency < 2.0 * np.pi / shortest and damping < BROADEST)
+    if not (2.0 * np.pi / longest < frequency < 2.0 * np.pi / shortest and damping < BROADEST):
+        return False
+    rising, turning = np.sqrt(_variances(fit))
+    must_rise = turning / (MOST_TURN * frequency)
+    return bool(must_rise < max(rising, SHOWN * frequency * np.sqrt(fit.noise[1])))
+
+
+def _variances(fit: Fit) -> Array:
+    """Of the water's rising, (m/s)^2, and turning, (rad/s)^2, that a fit's waves are."""
+    s, d, turn, *densities = fit.waves
+    rising, turning = np.array(densities) / (4.0 * d * s**3)
+    return np.array([rising, (turn * s) ** 2 * rising + turning])
 
 
 def mean_moment(fit: Fit) -> float:
@@ -190,9 +204,7 @@ def mean_moment(fit: Fit) -> float:
     k s z, and where it is deeper it turns less by k: on the mean by k r z = r^2 / s, nose down in seas from
     ahead and up in such from astern (second order, as the drift forces of Faltinsen, Sea Loads, ch. 5).
     """
-    s, d, turn, *densities = fit.waves
-    rising, turning = np.array(densities) / (4.0 * d * s**3)
-    return float(abs(fit.parameters[A2]) * ((turn * s) ** 2 * rising + turning) / s)
+    return float(abs(fit.parameters[A2]) * _variances(fit)[1] / fit.waves[0])
 
 
 def passes_in_waves(point: Point, inputs: list[Inputs]) -> list[KalmanPass]:

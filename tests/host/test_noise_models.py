@@ -150,6 +150,12 @@ def test_waves_are_found_with_their_frequency_and_bias_nothing() -> None:
     ran_away = [0.0, 0.0]
     for broad_or_slow in ([1.0, 0.4], [0.3, 0.1], [4.0, 0.1], ran_away):
         assert not is_sea(replace(fit, waves=np.array([*broad_or_slow, 0.0, 1.0, 1.0])))
+    turned = replace(
+        fit, waves=np.array([0.8, 0.04, 14.0, 1e-7, 2e-7]), noise=np.array([1e-6, 1e-4, 0.0, 0.0])
+    )
+    assert not is_sea(turned)  # water that turns the vehicle so rises by half of what the depth errs by
+    assert is_sea(replace(turned, noise=np.array([1e-6, 1e-3, 0.0, 0.0])))  # that would not show
+    assert is_sea(replace(turned, waves=np.array([0.8, 0.04, 1.0, 1e-5, 2e-7])))
     here = Point(fit.structure, fit.parameters, fit.initial, fit.levels)
     again = in_waves_from(here, inputs, fit.free, holds_noise=True)
     np.testing.assert_allclose(again.levels, fit.levels, rtol=1e-12)
