@@ -35,7 +35,9 @@ from host.recordings.recording import Array
 
 SLOWEST = 0.2  # rad/s; slower is current
 BROADEST = 0.4  # of a sea: 0.26 fits the waves of a fully developed one, 0.1 those of a young one
-MOST_TURN = 4.0  # s/m, of turning over the slope's velocity: deep water gives s / g, hulls came to 1.1
+MOST_TURN = (
+    4.0  # s/m, of turning over the water's acceleration: deep water gives s / g, simulated seas came to 1.1
+)
 SHOWN = 0.3  # of the depth's noise, that a swing exceeds which shows within a hundred rows
 FIRST_DAMPING = 0.1
 DAMPINGS = (0.02, 0.05)  # to begin with where the innovations swing: weak waves show in a narrow band only

@@ -277,7 +277,7 @@ def left_among(fitter: Fitter, waves: Waves) -> Leftover:
     """
     left = leftover(fitter, waves.fitted)
     gains = form_gains(fitter, waves.fitted)
-    del gains[SWINGING_MOMENT.name]
+    gains.pop(SWINGING_MOMENT.name, None)
     return replace(left, is_smooth=left.is_smooth or max(gains.values()) > margin(waves.fitted))
 
 
