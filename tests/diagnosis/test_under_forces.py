@@ -229,7 +229,7 @@ def test_what_pays_beside_them_is_named(thrown: tuple[Fitter, Explanation]) -> N
 
 
 @pytest.mark.parametrize(
-    "why", ["little is left", "lost", "large forces", "as likely", "by speed", "gains", "led"]
+    "why", ["little is left", "lost", "large forces", "as likely", "by speed", "gains", "has a form", "led"]
 )
 def test_else_the_search_goes_its_way(
     why: str, thrown: tuple[Fitter, Explanation], monkeypatch: pytest.MonkeyPatch
@@ -243,6 +243,8 @@ def test_else_the_search_goes_its_way(
         monkeypatch.setattr(outset, "FAR_LIKELIER", 1e3)
     monkeypatch.setattr(outset, "are_by_speed", lambda *_: why == "by speed")
     gains = {"ballast_change": 500.0 if why == "gains" else 1.0}
+    forms = {"unknown_plane_abs_delta": 500.0 if why == "has a form" else 1.0}
+    monkeypatch.setattr(outset, "form_gains", lambda *_: forms)
     search: Any = type("S", (), {"fitter": fitter, "gains": lambda *_: gains})()
     if why == "led":
         whole = Explanation(whole.names | {"actuator_saturation"}, whole.fit, whole.bic)

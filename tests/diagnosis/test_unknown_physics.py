@@ -52,7 +52,7 @@ def test_a_mass_that_turns_is_unexplained_and_described(tmp_path: Path) -> None:
     assert not found.effects
     # One form leaves so little that nothing larger need be tried.
     assert "one form of unknown physics" in stages
-    assert "what every vehicle has" not in stages
+    assert "what every vehicle has, led by the measurements" not in stages
     values = dict(zip(found.extended.fit.structure.names, found.extended.fit.parameters, strict=True))
     assert values["swing_period"] == pytest.approx(11.0, rel=0.01)
     assert np.hypot(values["swing_sine"], values["swing_cosine"]) == pytest.approx(0.08, rel=0.05)

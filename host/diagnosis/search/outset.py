@@ -147,8 +147,8 @@ def pushed_by_forces(search: "Search", whole: Explanation) -> Explanation | None
     """The same under random forces, where these explain the rest and nothing gains beside them; else None.
 
     Then the vehicle is as the equations have it but for what pushes it about and is in no catalogue, as turns
-    do; of something in the catalogue those forces would be the worse half. What is left beside a change or a
-    fault of the plane's drive may be another of these.
+    do; of something in the catalogue, or of physics with a form, those forces would be the worse half. What is
+    left beside a change or a fault of the plane's drive may be another of these.
     """
     fitter = search.fitter
     if not LITTLE < fitter.excess(whole.fit) < LOST or whole.names & {*SCANS, *DRIVE, *IN_TIME}:
@@ -159,7 +159,8 @@ def pushed_by_forces(search: "Search", whole: Explanation) -> Explanation | None
     if are_many or explained < FAR_LIKELIER * sea.fit.samples or are_by_speed(fitter, sea.fit):
         return None
     least = max(margin(sea) + log(sea.fit.samples), FAIR_PART * explained)
-    return sea if max(search.gains(sea).values()) < least else None
+    ahead = max(*search.gains(sea).values(), *form_gains(fitter, sea).values())
+    return sea if ahead < least else None
 
 
 def goes_on_from(search: "Search", joint: Explanation) -> bool:
