@@ -147,8 +147,8 @@ def pushed_by_forces(search: "Search", whole: Explanation) -> Explanation | None
     """The same under random forces, where these explain the rest and nothing gains beside them; else None.
 
     Then the vehicle is as the equations have it but for what pushes it about and is in no catalogue, as turns
-    do; of something in the catalogue, or with a form, those forces would be the worse half. What is left beside
-    a change or a fault of the plane's drive may be another of these.
+    do; of something in the catalogue, or with a form, those forces would be the worse half. What is left
+    beside a change or a fault of the plane's drive may be another of these.
     """
     fitter = search.fitter
     if not LITTLE < fitter.excess(whole.fit) < LOST or whole.names & {*SCANS, *DRIVE, *IN_TIME}:
