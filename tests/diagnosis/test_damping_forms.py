@@ -1,10 +1,12 @@
 """Drags that one other effect imitates are found in its place."""
 
+from dataclasses import replace
 from math import hypot
 
 from hidden_dive import hidden_dive
 
 from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.margins import ROUGH
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.search.damping_forms import STEADY, with_drags_instead
 from host.diagnosis.search.search import Search
@@ -28,3 +30,5 @@ def test_drags_take_the_place_of_steady_damping_that_did_their_work() -> None:
         assert found.bic < steady.bic - 10.0
         assert STEADY not in found.names
         assert "heave_quadratic_drag" in found.names
+        likelier = replace(steady, bic=found.bic - 2.0 * ROUGH)
+        assert with_drags_instead(search, likelier) is likelier

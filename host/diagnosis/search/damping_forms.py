@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from host.catalogue import ALONG_THE_HULL
 from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.margins import ROUGH
 from host.diagnosis.fits.starts import begun_from
 from host.diagnosis.search.pruning import pruned
 from host.diagnosis.search.whole_vehicle import ended
@@ -27,4 +28,6 @@ def with_drags_instead(search: "Search", best: Explanation) -> Explanation:
     search.on_progress("drags in place of steady damping")
     names = best.names - {STEADY} | {*DRAGS}
     found = search.remember(ended(search.fitter, begun_from(search.fitter, best, names), names))
+    if found.bic > best.bic + ROUGH:
+        return best  # leaving out some of them does not save so much
     return min(best, pruned(search, found), key=lambda e: e.bic)
