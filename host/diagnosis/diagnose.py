@@ -21,6 +21,7 @@ from host.diagnosis.proof.deviations import deviations
 from host.diagnosis.proof.locate import Location, locate
 from host.diagnosis.proof.minute import LEAST_ANGLE, minute_in
 from host.diagnosis.proof.scoring import Misfit, foretells, free_run_errors, misfit
+from host.diagnosis.proof.slight import is_slight
 from host.diagnosis.proof.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.proof.verdict import Verdict, remaining, verdict_on
 from host.diagnosis.recordings.sensed import as_sensed
@@ -29,7 +30,7 @@ from host.diagnosis.recordings.usable import check_usable, noted, with_plane_tol
 from host.diagnosis.search.candidates import eligible
 from host.diagnosis.search.exchange import twins
 from host.diagnosis.search.search import Search
-from host.diagnosis.search.unknown_physics import known_in
+from host.diagnosis.search.unknown_physics import known_in, without_unknown
 from host.diagnosis.search.whole_vehicle import beside_all, in_the_valley_of, widened
 from host.dynamics.equations import NAMES, Slot
 from host.identification.identifiability import ambiguity, left_open
@@ -229,7 +230,10 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
     effects.sort(key=lambda effect: -effect.delta_bic)
     is_astray = best.fit.has_process_noise and waves is None and horizon is None and after.chi2 > before.chi2
     is_told = not is_astray or foretells(search.base, best, spans, floor, HORIZON)
-    verdict = verdict_on(model, left, before, after, evidence(waves), is_told)
+    lean = without_unknown(search, best)
+    bare = after if lean is best else misfit(lean, spans, floor, horizon)
+    is_trace = waves is None and is_slight(lean, before, bare)
+    verdict = verdict_on(model, left, before, after, evidence(waves), is_told, is_trace)
     return Judged(before, after, effects, verdict, _slots(search, best, effects, verdict))
 
 

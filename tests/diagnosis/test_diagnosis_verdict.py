@@ -11,6 +11,7 @@ from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.leftover import Leftover
 from host.diagnosis.proof.scoring import Misfit
+from host.diagnosis.proof.slight import is_slight
 from host.diagnosis.proof.verdict import (
     Verdict,
     beyond_bounds_in,
@@ -94,6 +95,37 @@ def test_what_explains_all_but_the_stretches_that_were_held_out_says_so(base: Ex
     one = named(base, RARE[0])
     assert remaining("explained", one, leftover(), misfit(1.2)).endswith("sensors' own noise.")
     assert "held out pitch is off by 3.0 times it" in remaining("explained", one, leftover(), misfit(9.0))
+
+
+@pytest.mark.parametrize(
+    ("names", "before", "after", "is_trace"),
+    [
+        (COMMON, 5000.0, 1.4, True),
+        (COMMON | {RARE[0]}, 5000.0, 1.4, True),
+        (COMMON | {*RARE[:2]}, 5000.0, 1.4, False),
+        ({RARE[0], "net_buoyancy"}, 5000.0, 1.4, False),
+        (COMMON, 300.0, 1.4, False),
+        (COMMON, 5000.0, 2.1, False),
+    ],
+)
+def test_a_trace_is_left_of_a_real_vehicle_that_is_all_but_told(
+    base: Explanation, names: set[str], before: float, after: float, is_trace: bool
+) -> None:
+    assert is_slight(named(base, *names), misfit(before), misfit(after)) == is_trace
+
+
+def test_the_verdict_does_not_hang_on_a_trace_which_is_told(base: Explanation) -> None:
+    left, found = leftover(is_smooth=True), named(base, *COMMON)
+    names = frozenset({*COMMON, "unknown_moment_delta_delta"})
+    known = dict.fromkeys(structure_of(names).names, 0.0) | values_of(base)
+    formed = explanation_with(base, names, known)
+    for one, told in ((found, "too little to name"), (formed, "delta times delta")):
+        assert verdict_on(one, left, misfit(5000.0), misfit(1.2)) == "partly_explained"
+        assert verdict_on(one, left, misfit(5000.0), misfit(1.2), is_slight=True) == "explained"
+        said = remaining("explained", one, left, misfit(1.2))
+        assert "A trace is left of physics" in said
+        assert told in said
+    assert "trace" not in remaining("explained", found, leftover(), misfit(1.2))
 
 
 def values_of(base: Explanation) -> dict[str, float]:

@@ -62,11 +62,13 @@ def verdict_on(
     after: Misfit,
     waves: float = inf,
     foretells: bool = True,
+    is_slight: bool = False,
 ) -> Verdict:
     """Of an explanation, by what it leaves and how far it betters the base on held-out spans.
 
     waves      by how much of BIC those it was found among, if any, are likelier than no waves
     foretells  whether it foretells the next seconds there better than the base, if no free run can tell
+    is_slight  what it leaves is a trace (host.diagnosis.proof.slight)
     """
     if left.is_nothing and not best.names:
         return "no_mismatch"
@@ -74,7 +76,7 @@ def verdict_on(
     worst = max(before.chi2 * (SEA_DOUBT if best.fit.has_process_noise else 1.0), WORSE)
     if left.is_nothing and after.chi2 < WORSE and best.names == minute_in(best):
         return "no_mismatch"
-    if left.is_nothing and after.chi2 < worst and not unknown_in(best):
+    if is_slight or (left.is_nothing and after.chi2 < worst and not unknown_in(best)):
         return "explained" if foretells and not _doubt(best, left, waves) else "partly_explained"
     is_better = bool(known_in(best)) and after.chi2 < 0.7 * before.chi2
     return "partly_explained" if is_better and not beyond_geometry_in(best) else "unexplained"
@@ -218,7 +220,17 @@ def _doubt(explanation: Explanation, left: Leftover, waves: float) -> str:
 def remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit, waves: float = inf) -> str:
     """What the explanation leaves, in words, and what the model does about the sensors."""
     corrected = CORRECTED * (SPEED_CORRECTION.name in best.names)
-    return _remaining(verdict, best, left, after, waves) + corrected
+    trace = _trace(best, left) * (verdict == "explained")
+    return _remaining(verdict, best, left, after, waves) + trace + corrected
+
+
+def _trace(best: Explanation, left: Leftover) -> str:
+    """What an explanation tells of, though it does not hang on it."""
+    if told := unknown_in(best):
+        return f" A trace is left of physics that the catalogue does not hold. {' '.join(told)}"
+    return (
+        "" if left.is_nothing else " A trace is left of physics that is not known here, too little to name."
+    )
 
 
 def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit, waves: float) -> str:

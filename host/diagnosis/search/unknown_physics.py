@@ -70,6 +70,13 @@ def unknown_in(explanation: Explanation) -> list[str]:
     return said
 
 
+def without_unknown(search: Search, best: Explanation) -> Explanation:
+    """The set less its forms of unknown physics."""
+    for name in _forms_in(best):
+        best = search.without(best, name)
+    return best
+
+
 def _forms_in(explanation: Explanation) -> list[str]:
     return sorted(explanation.names & UNKNOWN.keys())
 
