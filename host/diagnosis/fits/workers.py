@@ -24,6 +24,7 @@ class Workers:
     """Carries out tasks in order; one job does so here, more in processes of their own."""
 
     def __init__(self, fitter: Fitter, jobs: int) -> None:
+        self.jobs = jobs
         self._fitter = fitter
         self._pool: ProcessPoolExecutor | None = None
         if jobs > 1:

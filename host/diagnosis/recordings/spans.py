@@ -15,6 +15,7 @@ ALARM_LATE = 90.0  # s, by which an alarm may come after what it tells of
 LONGEST_RUN = 600.0  # s; a teaching run starts anew after so long, or the smallest drift would rule it
 LONG = 8000  # rows of all teaching runs, beyond which a search begins with an excerpt
 EXCERPT, PIECE = 4000, 2000  # rows of an excerpt, and at least of each of its pieces
+LED, LED_PIECE = 1600, 800  # the same of what a continuation goes through; half as many again are no excerpt
 LEAST_MEASURED = 20  # values of each channel, for a span to be of use
 ENOUGH = 1.2  # times as many: readings do not come evenly
 
@@ -68,17 +69,34 @@ def excerpt(teaching: list[Recording], like: list[Recording] | None = None) -> l
 
     like  the same recordings with another plane, by which the pieces are chosen
     """
-    if sum(run.time.size for run in teaching) <= LONG:
+    if _rows(teaching) <= LONG:
         return teaching
-    parts, judged = ([part for run in runs for part in _pieces(run)] for runs in (teaching, like or teaching))
+    return _most_moved(teaching, like or teaching, EXCERPT, PIECE)
+
+
+def led_excerpt(teaching: list[Recording]) -> list[Recording]:
+    """The same, as short as tells the valley in which many coefficients lie together; else all."""
+    return teaching if _rows(teaching) <= 1.5 * LED else _most_moved(teaching, teaching, LED, LED_PIECE)
+
+
+def _rows(runs: list[Recording]) -> int:
+    return sum(run.time.size for run in runs)
+
+
+def _most_moved(
+    teaching: list[Recording], like: list[Recording], most: int, least_piece: int
+) -> list[Recording]:
+    parts, judged = (
+        [part for run in runs for part in _pieces(run, least_piece)] for runs in (teaching, like)
+    )
     ordered = np.argsort([-float(np.std(part.rudder)) * _is_measured(part) for part in judged])
     rows = np.cumsum([parts[k].time.size for k in ordered])
-    chosen = ordered[: 1 + int(np.searchsorted(rows, EXCERPT))]
+    chosen = ordered[: 1 + int(np.searchsorted(rows, most))]
     return [parts[k] for k in sorted(chosen)]
 
 
-def _pieces(run: Recording) -> list[Recording]:
-    edges = np.linspace(run.time[0], run.time[-1] + run.step, 1 + max(1, run.time.size // PIECE))
+def _pieces(run: Recording, least: int) -> list[Recording]:
+    edges = np.linspace(run.time[0], run.time[-1] + run.step, 1 + max(1, run.time.size // least))
     return [_begun(run.between(float(start), float(end))) for start, end in pairwise(edges)]
 
 

@@ -11,7 +11,7 @@ from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, ROUGH, margin
-from host.diagnosis.fits.trims import retrimmed
+from host.diagnosis.fits.trims import COMPRESSED, retrimmed
 from host.diagnosis.fits.workers import Task
 from host.diagnosis.search.pruning import pruned
 from host.diagnosis.search.whole_vehicle import is_real
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 LEADING = 8  # sets with a free trim that are looked at
 CONTENDERS = 3  # of them, for the first place
 LIKELY = 2  # offsets that may stand alone
+FAR_AWAY = 5.0  # times the range of depths that were seen
 BENT_BY_A_ZERO = ("speed_loss", "actuator_saturation", "rudder_stall", "rudder_effectiveness_change")
 """What depends on the plane's angle as no constant force and moment do."""
 
@@ -54,7 +55,8 @@ def with_best_offsets(search: "Search") -> Explanation:
 
 def with_offsets_asked_again(search: "Search", best: Explanation, is_new: bool) -> Explanation:
     """The set with what shifts the steady state told as is likeliest, of a new set for all offsets."""
-    return with_lasting_offsets(search, with_likeliest_offsets(search, best) if is_new else best)
+    best = with_lasting_offsets(search, with_likeliest_offsets(search, best) if is_new else best)
+    return with_constant_buoyancy(search, best)
 
 
 def with_likeliest_offsets(search: "Search", best: Explanation) -> Explanation:
@@ -85,6 +87,25 @@ def with_lasting_offsets(search: "Search", best: Explanation) -> Explanation:
         lasting = search.fitter.polished(search.fitter.grown(fewer, offset, [size]))
         best = min(best, search.remember(lasting), key=lambda e: e.bic)
     return best
+
+
+def with_constant_buoyancy(search: "Search", best: Explanation) -> Explanation:
+    """The set with a net buoyancy in the place of one that changes with depth, unless that clearly pays.
+
+    Neutral at a depth far from any that was seen, it changes little there and is most of all a constant
+    force; which an exchange of one member beside many others no longer asks.
+    """
+    if COMPRESSED not in best.names or "net_buoyancy" in best.names:
+        return best
+    values = dict(zip(best.fit.structure.names, best.fit.parameters.tolist(), strict=True))
+    depths = np.concatenate([recording.depth for recording in search.fitter.recordings])
+    away = float(np.nanmean(depths)) - values["neutral_depth"]
+    if abs(away) < FAR_AWAY * float(np.nanmax(depths) - np.nanmin(depths)):
+        return best
+    fewer = search.fitter.shrunk(best, COMPRESSED)
+    size = np.array([values["c_wz"] * away])
+    constant = search.fitter.polished(search.fitter.grown(fewer, "net_buoyancy", [size]))
+    return min(best, search.remember(constant), key=lambda e: e.bic + margin(e) * (e is best))
 
 
 def with_one_offset(search: "Search", best: Explanation) -> Explanation:

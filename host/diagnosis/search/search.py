@@ -223,6 +223,10 @@ class Search:
         tasks: list[Task] = [(Fitter.polished, (e,)) for e in rough if e.bic < bic + ROUGH]
         return [self.remember(e) for e in self.workers.results(tasks)]
 
+    def elsewhere(self, fitter: Fitter, workers: Workers) -> "Search":
+        """A search with nothing tried yet, over other stretches."""
+        return Search(fitter, workers, self.on_progress, fitter.base, fitter.root)
+
     def remember(self, explanation: Explanation) -> Explanation:
         """Keeps the better of two fits of one set."""
         known = self.tried.get(explanation.names)

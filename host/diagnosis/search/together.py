@@ -12,18 +12,20 @@ from host.catalogue import ORDINARY
 from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.fits.drift_fits import plain_drift
-from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.leftover import is_above_floor
 from host.diagnosis.fits.margins import FEW, LITTLE, MUCH, SMALL, margin
 from host.diagnosis.fits.starts import is_far
 from host.diagnosis.fits.trims import retrimmed
-from host.diagnosis.fits.workers import Task
-from host.diagnosis.search.continuation import continued
+from host.diagnosis.fits.workers import Task, Workers
+from host.diagnosis.recordings.spans import led_excerpt
+from host.diagnosis.search.continuation import continued, steered_again
 from host.diagnosis.search.pruning import pruned
 from host.diagnosis.search.whole_vehicle import all_beside
 from host.likelihood.gauss_newton import Point
 from host.likelihood.valleys import look_alikes
+from host.recordings.recording import Recording
 
 if TYPE_CHECKING:
     from host.diagnosis.search.search import Search
@@ -162,12 +164,27 @@ def _by_continuation(search: "Search") -> Explanation | None:
     """All that every vehicle has, with little beside it; None where the filter loses the recording."""
     search.on_progress("what every vehicle has, led by the measurements")
     names = frozenset({*ORDINARY, FREE_TRIM.name, *search.fitter.tools_beside(frozenset(ORDINARY))})
-    found = continued(search, names, MOST_BESIDE)
+    part = led_excerpt(search.fitter.recordings)
+    if part is search.fitter.recordings or search.fitter.wander.any():
+        found = continued(search, names, MOST_BESIDE)
+    else:
+        found = _continued_through(search, part, names)
     if found is None:
         return None
     end = search.remember(search.fitter.polished(found))
     search.joint.add(end.names)
     return end
+
+
+def _continued_through(search: "Search", part: list[Recording], names: Names) -> Explanation | None:
+    """The same through a part of the recordings, which tells the valley; then on all of them."""
+    fitter = Fitter(part)
+    with Workers(fitter, search.workers.jobs) as workers:
+        led = search.elsewhere(fitter, workers)
+        found = continued(led, names, MOST_BESIDE)
+    if led.steered is not None:
+        search.steered = steered_again(search, led.steered)
+    return None if found is None else search.fitter.refitted(found)
 
 
 def _more(search: "Search", best: Explanation) -> list[Task]:
