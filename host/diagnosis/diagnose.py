@@ -36,6 +36,7 @@ from host.dynamics.equations import NAMES, Slot
 from host.identification.identifiability import ambiguity, left_open
 from host.noise.noise_floor import noise_floor
 from host.recordings.consistency import check_signs, units_note
+from host.recordings.left_out import told as spans_told
 from host.recordings.outliers import without_outliers
 from host.recordings.recording import Array, Recording
 
@@ -125,7 +126,8 @@ def diagnose(
     seen = noted(seen, units_note(seen))
     seen = seen if may_be_quiet else as_sensed(seen)
     seen = with_plane_moments(seen, on_progress)
-    first, *others = likelier_first(ways(seen), on_progress, jobs)
+    may_leave_out = like is None and not may_be_quiet
+    first, *others = likelier_first(ways(seen), on_progress, jobs, may_leave_out)
     return _diagnosed(first, others, on_progress, jobs, like, [])
 
 
@@ -187,7 +189,7 @@ def _diagnosed(
     stds = np.array([std.get(name, 0.0) for name in NAMES])
     hardly = [left_open(found.fit.parameters, stds)] * (judged.verdict == "no_mismatch")
     return Diagnosis(
-        verdict=judged.verdict,
+        verdict=_with_apart(judged.verdict, way),
         recordings=recordings,
         floor=floor,
         base=base,
@@ -202,11 +204,28 @@ def _diagnosed(
         force=unknown_force(longest, {n: values[n] for n in NAMES}, floor, fitter.accelerations),
         ranking=alone if is_ranked_alone else [(effect.name, effect.delta_bic) for effect in effects],
         is_ranked_alone=is_ranked_alone,
-        remaining=" ".join(filter(None, [told, *_unnamed(best, waves), *(_other_answers(found) or hardly)])),
+        remaining=" ".join(
+            filter(None, [_apart(way), told, *_unnamed(best, waves), *(_other_answers(found) or hardly)])
+        ),
         has_sea=best.fit.has_process_noise,
         bic=best.bic,
         std=std,
     )
+
+
+def _apart(way: Way) -> str:
+    """Where nothing of this holds."""
+    if not way.apart:
+        return ""
+    return (
+        f"From {spans_told(way.apart)} other physics acts that comes and goes (turns, say): that was left "
+        "out, and what follows is of the rest."
+    )
+
+
+def _with_apart(verdict: Verdict, way: Way) -> Verdict:
+    """The verdict on all of a recording, of which stretches were left out."""
+    return "partly_explained" if way.apart and verdict in ("explained", "no_mismatch") else verdict
 
 
 def _is_likelier(other: Way, explained: Explained) -> bool:

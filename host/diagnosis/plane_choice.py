@@ -8,19 +8,28 @@ from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.disturbances.plain_waves import plain_waves, whole_in_waves
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
-from host.diagnosis.fits.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, margin
+from host.diagnosis.fits.margins import LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN, margin
 from host.diagnosis.fits.sea_fits import as_filtered, with_waves
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.recordings.spans import divide, excerpt
-from host.diagnosis.search.outset import at_the_outset, leads_on, pushed_by_forces, says_all
+from host.diagnosis.search.apart import stretches_apart
+from host.diagnosis.search.outset import (
+    at_the_outset,
+    beside_what_leads,
+    leads_on,
+    pushed_by_forces,
+    says_all,
+)
 from host.diagnosis.search.search import Search
 from host.diagnosis.search.whole_vehicle import is_real, with_all_ordinary
+from host.recordings.left_out import Span, without
 from host.recordings.plane_between_rows import ways_between
 from host.recordings.recording import Recording
 
 FAR_LIKELIER = 1.0  # of BIC a sample: what no search without waves makes up for
 CONTENDERS = 10  # sets that are tried with the plane the other way
 MOST_WAYS = 2  # that are searched: the base equations tell a third from these
+APART = "other physics acts, and left out"
 LEADING = 3  # single effects, of which the likeliest often is a part of the truth
 
 
@@ -33,6 +42,7 @@ class Way(NamedTuple):
     calm    the same without waves or random forces, where these explain far more
     pushed  the same under random forces, where nothing in the catalogue gains beside these
     alone  each effect alone, where these were fitted
+    apart  stretches of the recording, s, in which other physics acts, and which were left out
     """
 
     recordings: list[Recording]
@@ -43,6 +53,7 @@ class Way(NamedTuple):
     calm: Explanation | None = None
     pushed: Explanation | None = None
     alone: tuple[Explanation, ...] = ()
+    apart: tuple[Span, ...] = ()
 
 
 def ways(recordings: list[Recording]) -> list[Way]:
@@ -57,18 +68,29 @@ def ways(recordings: list[Recording]) -> list[Way]:
     return sorted(fitted, key=lambda way: way.fitter.base.bic)[:MOST_WAYS]
 
 
-def likelier_first(found: list[Way], on_progress: Callable[[str], None], jobs: int) -> list[Way]:
+def likelier_first(
+    found: list[Way], on_progress: Callable[[str], None], jobs: int, may_leave_out: bool = False
+) -> list[Way]:
     """The ways, the likelier first, as what tells more than the base equations do sees them.
 
     That is all that every vehicle has, where nothing is left beside it; else plain waves, where there are
     any, with all that where it is likelier; else all that every vehicle has, where random forces account for
     what is left, or next to nothing is; else single effects.
+
+    may_leave_out  whether stretches may be left out without which nothing is left beside it
     """
     leading, *others = sorted(found, key=lambda way: way.fitter.root.bic)
     on_progress("what every vehicle has")
-    whole = at_the_outset(leading.fitter, jobs)
+    whole = at_the_outset(leading.fitter)
     if whole is not None and says_all(leading.fitter, whole):
         return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
+    if may_leave_out and whole is not None and leading.fitter.excess(whole.fit) > MUCH:
+        on_progress("stretches of other physics")
+        if apart := stretches_apart(leading.recordings):
+            rest = likelier_first(ways(without(leading.recordings, apart, APART)), on_progress, jobs)
+            return [way._replace(apart=tuple(apart)) for way in rest]
+    if whole is not None:
+        whole = beside_what_leads(leading.fitter, whole, jobs)
     if seen := _among_waves(found):
         on_progress("what every vehicle has, in the waves")
         return _in_a_swell(seen, whole)

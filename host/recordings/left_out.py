@@ -1,6 +1,7 @@
 """Stretches that whoever flew the vehicle leaves out: turns, say, in which roll and yaw carry the pitch."""
 
 import re
+from collections.abc import Iterable
 from dataclasses import replace
 from math import inf
 
@@ -25,8 +26,12 @@ def spans_in(text: str) -> list[Span]:
     return sorted(spans)
 
 
-def without(recordings: list[Recording], spans: list[Span]) -> list[Recording]:
+def without(
+    recordings: list[Recording], spans: list[Span], why: str = "left out as asked"
+) -> list[Recording]:
     """What is left of the stretches of one file; each piece begins from a state of its own, as after a gap.
+
+    A note says why, and which.
 
     Raises RecordingError where there are several files, or nothing is left.
     """
@@ -41,5 +46,10 @@ def without(recordings: list[Recording], spans: list[Span]) -> list[Recording]:
     pieces = [piece for piece in pieces if piece.time.size > 1 and piece.duration >= LEAST_KEPT]
     if not pieces:
         raise RecordingError(f"{name}: --leave-out leaves nothing of it")
-    note = "left out as asked: " + ", ".join(f"{start:g} to {end:g} s" for start, end in spans)
+    note = f"{why}: {told(spans)}"
     return [replace(piece, notes=(*piece.notes, note)) for piece in pieces]
+
+
+def told(spans: Iterable[Span]) -> str:
+    """The stretches, in words."""
+    return ", ".join(f"{start:.5g} to {end:.5g} s" for start, end in spans)

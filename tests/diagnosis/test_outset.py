@@ -22,7 +22,15 @@ from host.diagnosis.fits.workers import Workers
 from host.diagnosis.plane_choice import Way, likelier_first
 from host.diagnosis.search import outset
 from host.diagnosis.search import search as module
-from host.diagnosis.search.outset import DRIVE, FAR_LESS, IN_TIME, LOST, at_the_outset, leads_on
+from host.diagnosis.search.outset import (
+    DRIVE,
+    FAR_LESS,
+    IN_TIME,
+    LOST,
+    at_the_outset,
+    beside_what_leads,
+    leads_on,
+)
 from host.diagnosis.search.search import Search
 from host.diagnosis.search.whole_vehicle import ended
 from host.recordings.read import read_recordings
@@ -49,6 +57,11 @@ def ballast(time: float, x: Array, plane: float) -> tuple[float, float, float]: 
 
 def swell(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
     return 0.0, 0.0, 0.3 * np.sin(2.0 * np.pi * time / 20.0)
+
+
+def led_at_the_outset(fitter: Fitter) -> Explanation | None:
+    whole = at_the_outset(fitter)
+    return None if whole is None else beside_what_leads(fitter, whole)
 
 
 def test_of_a_real_vehicle_all_that_every_one_has_leaves_nothing(real: Fitter) -> None:
@@ -160,7 +173,7 @@ def test_what_keeps_the_plane_back_is_asked_where_much_is_left(
     monkeypatch.setattr(outset, "_by_fewer", lambda *a: a[2])
     monkeypatch.setattr(outset, "_beside_what_leads", lambda _, __, names, ___: tried.append(names) or [])
     monkeypatch.setattr(real, "excess", lambda fit: 30.0 if fit is root_fit else left)
-    assert at_the_outset(real) is not None
+    assert led_at_the_outset(real) is not None
     assert tried == asked
 
 
@@ -176,7 +189,7 @@ def test_what_acts_on_a_drawn_vehicle_is_found_beside_all_that_it_has(
     card = Card("one" if len(hidden) == 1 else "two", hidden)
     write_csv(tmp_path / "dive.csv", draw(77201, number, card, "usual").table)
     fitter = Fitter(read_recordings(tmp_path / "dive.csv", default_vehicle()))
-    found = at_the_outset(fitter)
+    found = led_at_the_outset(fitter)
     assert found is not None
     assert hidden[-1] in found.names
     assert leads_on(fitter, found)
@@ -192,13 +205,13 @@ def test_a_textbook_vehicle_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_where_it_leads_nowhere_something_may_have_changed(monkeypatch: pytest.MonkeyPatch) -> None:
     fitter = Fitter([hidden_dive(ballast, duration=60.0)])
     assert fitter.excess(fitter.root.fit) > LOST
-    found = at_the_outset(fitter)
+    found = led_at_the_outset(fitter)
     assert found is not None
     assert "ballast_change" in found.names
     assert found.leaves_white
     assert leads_on(fitter, found)
     monkeypatch.setattr(outset, "_beside_what_leads", lambda *_: [])
-    nowhere = at_the_outset(fitter)
+    nowhere = led_at_the_outset(fitter)
     assert nowhere is not None
     assert not leads_on(fitter, nowhere)
 
@@ -206,7 +219,7 @@ def test_where_it_leads_nowhere_something_may_have_changed(monkeypatch: pytest.M
 def test_where_it_leads_nowhere_water_may_swing() -> None:
     fitter = Fitter([hidden_dive(swell, duration=60.0)])
     assert fitter.excess(fitter.root.fit) > LOST
-    found = at_the_outset(fitter)
+    found = led_at_the_outset(fitter)
     assert found is not None
     assert "internal_wave" in found.names
     assert leads_on(fitter, found)
@@ -286,6 +299,7 @@ def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> N
     held, moved, worse = way(-2.0, np.nan), way(-1.0, -11.0), way(-1.0, -9.0)
     monkeypatch.setattr(plane_choice, "at_the_outset", lambda *_: whole)
     monkeypatch.setattr(plane_choice, "plain_waves", None)  # nothing is left to see
+    monkeypatch.setattr(plane_choice, "beside_what_leads", lambda _, one, __: one)
     assert order(moved, held) == [0, 1]
     assert order(worse, held) == [1, 0]
     assert likelier_first([held], lambda _: None, 1)[0].outset is whole

@@ -88,12 +88,6 @@ def continued(search: "Search", names: Names, most_beside: int) -> Explanation |
     return fitter.explained(best.names, fitter.fitted([_forced(fitter, _at(best), 0.0)]))
 
 
-def steered_again(search: "Search", steered: Explanation) -> Explanation | None:
-    """What was likeliest on other stretches under such forces, on those of this search."""
-    point = search.fitter.carried_over(steered).with_noise(steered.fit.noise)
-    return next(iter(_steered(search, [point], STEPS)), None)
-
-
 def _kept(search: "Search", followed: list[Explanation]) -> Explanation:
     """The likeliest of all stages: of a hull that is unstable, none of the last is."""
     known = [] if search.steered is None else [search.steered]

@@ -27,6 +27,7 @@ from host.diagnosis.fits.speed_forces import are_by_speed
 from host.diagnosis.fits.starts import begun_from, guess
 from host.diagnosis.fits.trims import retrimmed
 from host.diagnosis.fits.workers import Workers
+from host.diagnosis.recordings.spans import led_excerpt
 from host.diagnosis.search.lone_form import likely_forms
 from host.diagnosis.search.pruning import pruned
 from host.diagnosis.search.together import with_more
@@ -57,30 +58,49 @@ IN_TIME = ("surface_waves", "internal_wave", "unknown_swinging_moment", *sorted(
 """What swings with one period, or wanders. Of a sea it follows a part: little must be left beside it."""
 
 
-def at_the_outset(fitter: Fitter, jobs: int = 1) -> Explanation | None:
-    """The root with all that every vehicle has, where that leaves much; None where it does not.
-
-    Where they lead nowhere, beside what changes at one moment, goes with time or keeps the plane back, if
-    that leaves less; where they leave much, beside the latter two.
-    """
+def at_the_outset(fitter: Fitter) -> Explanation | None:
+    """The root with all that every vehicle has, where the root leaves much; None where it does not."""
     if fitter.excess(fitter.root.fit) < MUCH:
         return None
-    best = fitter.root
-    names = frozenset({FREE_TRIM.name, *ORDINARY, *FAINT, ALONG_THE_HULL})
-    names |= {*fitter.tools_beside(names)}
-    for start in _starts(fitter, names):
-        found = ended(fitter, start, names)
+    best, names = fitter.root, names_of_all(fitter)
+    told = _as_a_part_tells(fitter, names)
+    for found in ends_of(fitter, names) if told is None else [told]:
         if says_all(fitter, found):
             return found
         best = min(best, found, key=lambda e: e.bic)
         if fitter.excess(best.fit) > LOST:
-            led = _beside_what_leads(fitter, best, (*SCANS, *DRIVE, *IN_TIME), jobs)
-            return min([best, *led], key=lambda e: e.bic)
+            break
+    return best
+
+
+def beside_what_leads(fitter: Fitter, best: Explanation, jobs: int = 1) -> Explanation:
+    """The same beside what changes at a moment, goes with time or keeps the plane back, if that leaves less.
+
+    Where it leads nowhere; where it leaves much, beside the latter two.
+    """
+    if fitter.excess(best.fit) > LOST:
+        led = _beside_what_leads(fitter, best, (*SCANS, *DRIVE, *IN_TIME), jobs)
+        return min([best, *led], key=lambda e: e.bic)
     best = min(best, _by_fewer(fitter, fitter.root, best, jobs), key=lambda e: e.bic)
     if fitter.excess(best.fit) > MUCH:
         led = _beside_what_leads(fitter, best, (*DRIVE, *IN_TIME), jobs)
         best = min([best, *led], key=lambda e: e.bic)
     return best
+
+
+def _as_a_part_tells(fitter: Fitter, names: Names) -> Explanation | None:
+    """The set from where it leaves next to nothing of an excerpt; None where it leaves more there.
+
+    A free run over a long recording has many maxima; over short pieces, each with a start of its own, few.
+    """
+    pieces = led_excerpt(fitter.recordings)
+    if pieces is fitter.recordings or fitter.wander.any():
+        return None
+    part = Fitter(pieces)
+    for found in ends_of(part, names):
+        if says_all(part, found) or part.excess(found.fit) < LITTLE:
+            return fitter.refitted(found)
+    return None
 
 
 def _by_fewer(fitter: Fitter, leading: Explanation, whole: Explanation, jobs: int) -> Explanation:
@@ -199,6 +219,17 @@ def _with_a_form(search: "Search", whole: Explanation) -> Explanation:
     best = min((e for e in polished if e.leaves_white), key=lambda e: e.bic, default=whole)
     search.joint.add(best.names)
     return best
+
+
+def names_of_all(fitter: Fitter) -> Names:
+    """All that every vehicle has beside a free trim, and what that needs on these recordings."""
+    names = frozenset({FREE_TRIM.name, *ORDINARY, *FAINT, ALONG_THE_HULL})
+    return names | {*fitter.tools_beside(names)}
+
+
+def ends_of(fitter: Fitter, names: Names) -> Iterator[Explanation]:
+    """The set from where it may begin: each is fitted when it is asked for."""
+    return (ended(fitter, start, names) for start in _starts(fitter, names))
 
 
 def _starts(fitter: Fitter, names: Names) -> Iterator[Point]:

@@ -20,12 +20,11 @@ from host.diagnosis.fits.starts import is_far
 from host.diagnosis.fits.trims import retrimmed
 from host.diagnosis.fits.workers import Task, Workers
 from host.diagnosis.recordings.spans import led_excerpt
-from host.diagnosis.search.continuation import continued, steered_again
+from host.diagnosis.search.continuation import continued
 from host.diagnosis.search.pruning import pruned
 from host.diagnosis.search.whole_vehicle import all_beside
 from host.likelihood.gauss_newton import Point
 from host.likelihood.valleys import look_alikes
-from host.recordings.recording import Recording
 
 if TYPE_CHECKING:
     from host.diagnosis.search.search import Search
@@ -164,11 +163,7 @@ def _by_continuation(search: "Search") -> Explanation | None:
     """All that every vehicle has, with little beside it; None where the filter loses the recording."""
     search.on_progress("what every vehicle has, led by the measurements")
     names = frozenset({*ORDINARY, FREE_TRIM.name, *search.fitter.tools_beside(frozenset(ORDINARY))})
-    part = led_excerpt(search.fitter.recordings)
-    if part is search.fitter.recordings or search.fitter.wander.any():
-        found = continued(search, names, MOST_BESIDE)
-    else:
-        found = _continued_through(search, part, names)
+    found = _continued_through_a_part(search, names) or continued(search, names, MOST_BESIDE)
     if found is None:
         return None
     end = search.remember(search.fitter.polished(found))
@@ -176,15 +171,17 @@ def _by_continuation(search: "Search") -> Explanation | None:
     return end
 
 
-def _continued_through(search: "Search", part: list[Recording], names: Names) -> Explanation | None:
-    """The same through a part of the recordings, which tells the valley; then on all of them."""
-    fitter = Fitter(part)
+def _continued_through_a_part(search: "Search", names: Names) -> Explanation | None:
+    """The same through an excerpt, and from there on all; None where much is left of the excerpt."""
+    pieces = led_excerpt(search.fitter.recordings)
+    if pieces is search.fitter.recordings or search.fitter.wander.any():
+        return None
+    fitter = Fitter(pieces)
     with Workers(fitter, search.workers.jobs) as workers:
-        led = search.elsewhere(fitter, workers)
-        found = continued(led, names, MOST_BESIDE)
-    if led.steered is not None:
-        search.steered = steered_again(search, led.steered)
-    return None if found is None else search.fitter.refitted(found)
+        found = continued(search.elsewhere(fitter, workers), names, MOST_BESIDE)
+    if found is None or fitter.excess(found.fit) > MUCH:
+        return None
+    return search.fitter.refitted(found)
 
 
 def _more(search: "Search", best: Explanation) -> list[Task]:

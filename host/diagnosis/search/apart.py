@@ -1,0 +1,86 @@
+"""Stretches in which other physics acts, that comes and goes: turns, say, whose roll and yaw carry pitch.
+
+A free run through them ends far from where the vehicle is, and no effect of the vertical plane explains it.
+Over short pieces, each with a start of its own, all that every vehicle has explains the others: the worst are
+left out until it does (least trimmed squares: Rousseeuw, J. Am. Stat. Assoc. 79, 1984).
+"""
+
+from itertools import pairwise
+
+import numpy as np
+
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.margins import LITTLE
+from host.diagnosis.search.outset import ends_of, names_of_all, says_all
+from host.recordings.left_out import Span
+from host.recordings.recording import Array, Recording
+
+PIECE, LEAST_ROWS = 25.0, 100  # s and rows of a piece, at least
+LEAST_PIECES = 8
+MOST = 0.35  # of all pieces, that may be apart
+WORSE = 1.35  # times what the median piece leaves, and the noise floor: four deviations of 250 rows
+AT_ONCE = 0.4  # of what the worst leaves: what is less bad may only be bent by that
+MOST_ROUNDS = 6
+
+
+def stretches_apart(recordings: list[Recording]) -> list[Span]:
+    """The stretches, s, of one recording without which all that every vehicle has leaves white noise.
+
+    None where they are many, or last until the end: what changed and never comes back is in the catalogue.
+    """
+    pieces = [piece for recording in recordings for piece in _pieces(recording)]
+    names = {recording.name for recording in recordings}
+    if len(pieces) < LEAST_PIECES or len(names) > 1 or any(recording.alarms for recording in recordings):
+        return []
+    kept = pieces
+    for _ in range(MOST_ROUNDS):
+        fitter = Fitter(kept)
+        whole = _best_of_all(fitter)
+        left = _left(fitter, whole)
+        is_apart = left > max(WORSE * max(float(np.median(left)), 1.0), AT_ONCE * float(left.max()))
+        if not is_apart.any():
+            break
+        kept = [piece for piece, apart in zip(kept, is_apart, strict=True) if not apart]
+        if len(kept) < (1.0 - MOST) * len(pieces):
+            return []
+    if is_apart.any() or not (says_all(fitter, whole) or fitter.excess(whole.fit) < LITTLE):
+        return []
+    starts = {piece.time[0] for piece in kept}
+    if len(kept) == len(pieces) or pieces[-1].time[0] not in starts:
+        return []
+    return _joined([piece for piece in pieces if piece.time[0] not in starts])
+
+
+def _pieces(recording: Recording) -> list[Recording]:
+    rows = max(LEAST_ROWS, round(PIECE / recording.step))
+    edges = np.linspace(
+        recording.time[0], recording.time[-1] + recording.step, 1 + max(1, recording.time.size // rows)
+    )
+    return [recording.between(float(start), float(end)) for start, end in pairwise(edges)]
+
+
+def _best_of_all(fitter: Fitter) -> Explanation:
+    """The root with all that every vehicle has, from the first start that leaves nothing, or the best."""
+    best = fitter.root
+    for found in ends_of(fitter, names_of_all(fitter)):
+        best = min(best, found, key=lambda e: e.bic)
+        if says_all(fitter, best):
+            break
+    return best
+
+
+def _left(fitter: Fitter, whole: Explanation) -> Array:
+    """Squared errors of each piece over the noise floor, in the worse channel."""
+    scale = whole.fit.noise[:2] / fitter.floor
+    return np.array([np.nanmax(np.nanmean(e**2, axis=1) * scale) for e in whole.fit.whitened])
+
+
+def _joined(pieces: list[Recording]) -> list[Span]:
+    spans: list[Span] = []
+    for piece in pieces:
+        start, end = float(piece.time[0]), float(piece.time[-1] + piece.step)
+        if spans and start - spans[-1][1] < 1.5 * piece.step:
+            start = spans.pop()[0]
+        spans.append((start, end))
+    return spans

@@ -1,0 +1,77 @@
+"""Stretches of a dive in which other physics acts, and is gone again."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from hidden_dive import Extra, hidden_dive, nothing
+
+from host.catalogue import structure_of
+from host.diagnosis import plane_choice
+from host.diagnosis.diagnose import _apart, _with_apart
+from host.diagnosis.plane_choice import Way, likelier_first
+from host.diagnosis.search import apart
+from host.diagnosis.search.apart import stretches_apart
+from host.recordings.recording import Array
+
+BEGINS, ENDS = 100.0, 140.0  # s
+
+
+def turning(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+    is_turning = BEGINS < time < ENDS
+    return 0.2 * is_turning, (0.5 + 2.0 * x[0]) * is_turning, 0.0
+
+
+def lightened(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+    return -0.2 * (time > 2.0 * BEGINS), 0.0, 0.0
+
+
+def everywhere(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+    return 0.0, 1.5 * np.sin(time), 0.0
+
+
+@pytest.mark.parametrize(
+    ("extra", "is_apart"), [(turning, True), (lightened, False), (everywhere, False), (nothing, False)]
+)
+def test_a_turn_is_apart_and_what_stays_is_not(extra: Extra, is_apart: bool) -> None:
+    spans = stretches_apart([hidden_dive(extra, duration=250.0)])
+    assert bool(spans) == is_apart
+    if is_apart:
+        ((start, end),) = spans
+        assert BEGINS - apart.PIECE < start < BEGINS + 2.0
+        assert ENDS - 2.0 < end < ENDS + 1.5 * apart.PIECE
+
+
+def test_short_recordings_several_and_alarms_are_taken_whole() -> None:
+    dive = hidden_dive(turning, duration=250.0)
+    assert stretches_apart([dive.between(0.0, 150.0)]) == []
+    assert stretches_apart([dive, replace(dive, name="other.csv")]) == []
+    assert stretches_apart([replace(dive, alarms=(BEGINS,))]) == []
+
+
+def test_what_is_apart_is_left_out_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    dive = hidden_dive(duration=250.0)
+    fitter: Any = SimpleNamespace(root=SimpleNamespace(bic=0.0), excess=lambda _: 9.0)
+    whole: Any = SimpleNamespace(bic=0.0, fit=None, names=structure_of(()).effect_names, leaves_white=False)
+    rest: list[Any] = []
+
+    def begun(recordings: Any) -> list[Way]:
+        rest.append(recordings)
+        return [Way(recordings, fitter)]
+
+    monkeypatch.setattr(plane_choice, "ways", begun)
+    monkeypatch.setattr(plane_choice, "stretches_apart", lambda _: [(BEGINS, ENDS)])
+    monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: None if rest else whole)
+    monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)
+    (way,) = likelier_first([Way([dive], cast("Any", fitter))], lambda _: None, 1, may_leave_out=True)
+    assert way.apart == ((BEGINS, ENDS),)
+    assert [piece.time[[0, -1]].round(1).tolist() for piece in rest[0]] == [[0.0, 99.9], [140.0, 249.9]]
+    assert rest[0][0].notes == ("other physics acts, and left out: 100 to 140 s",)
+    assert "From 100 to 140 s other physics acts" in _apart(way)
+    assert _apart(Way([dive], cast("Any", fitter))) == ""
+    assert _with_apart("explained", way) == "partly_explained"
+    assert _with_apart("no_mismatch", way) == "partly_explained"
+    assert _with_apart("unexplained", way) == "unexplained"
+    assert _with_apart("explained", Way([dive], cast("Any", fitter))) == "explained"
