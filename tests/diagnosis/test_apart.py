@@ -44,6 +44,11 @@ def test_a_turn_is_apart_and_what_stays_is_not(extra: Extra, is_apart: bool) -> 
         assert ENDS - 2.0 < end < ENDS + 1.5 * apart.PIECE
 
 
+def test_what_an_effect_would_explain_is_not_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(apart, "gain", lambda *_, **__: 1e9)
+    assert stretches_apart([hidden_dive(turning, duration=250.0)]) == []
+
+
 def test_short_recordings_several_and_alarms_are_taken_whole() -> None:
     dive = hidden_dive(turning, duration=250.0)
     assert stretches_apart([dive.between(0.0, 150.0)]) == []

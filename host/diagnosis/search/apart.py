@@ -9,10 +9,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from host.catalogue.moments import SCANS
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LITTLE
-from host.diagnosis.search.outset import ends_of, names_of_all, says_all
+from host.diagnosis.fits.prospects import form_gains, gain
+from host.diagnosis.search.outset import IN_TIME, ends_of, names_of_all, says_all
 from host.recordings.left_out import Span
 from host.recordings.recording import Array, Recording
 
@@ -22,6 +24,7 @@ MOST = 0.35  # of all pieces, that may be apart
 WORSE = 1.35  # times what the median piece leaves, and the noise floor: four deviations of 250 rows
 AT_ONCE = 0.4  # of what the worst leaves: what is less bad may only be bent by that
 MOST_ROUNDS = 6
+SHARE = 0.5  # of what leaving out does, that no effect promises to do
 
 
 def stretches_apart(recordings: list[Recording]) -> list[Span]:
@@ -34,9 +37,11 @@ def stretches_apart(recordings: list[Recording]) -> list[Span]:
     if len(pieces) < LEAST_PIECES or len(names) > 1 or any(recording.alarms for recording in recordings):
         return []
     kept = pieces
-    for _ in range(MOST_ROUNDS):
+    for number in range(MOST_ROUNDS):
         fitter = Fitter(kept)
         whole = _best_of_all(fitter)
+        if number == 0:
+            all_of_them = fitter, whole
         left = _left(fitter, whole)
         is_apart = left > max(WORSE * max(float(np.median(left)), 1.0), AT_ONCE * float(left.max()))
         if not is_apart.any():
@@ -48,6 +53,8 @@ def stretches_apart(recordings: list[Recording]) -> list[Span]:
         return []
     starts = {piece.time[0] for piece in kept}
     if len(kept) == len(pieces) or pieces[-1].time[0] not in starts:
+        return []
+    if _share_of_an_effect(*all_of_them, whole) > SHARE:
         return []
     return _joined([piece for piece in pieces if piece.time[0] not in starts])
 
@@ -68,6 +75,22 @@ def _best_of_all(fitter: Fitter) -> Explanation:
         if says_all(fitter, best):
             break
     return best
+
+
+def _share_of_an_effect(fitter: Fitter, bent: Explanation, freed: Explanation) -> float:
+    """How much of what leaving out did an effect, or a form of unknown physics, promises to do on all pieces.
+
+    What acts only far over, or fast, is as local in time as a turn. What goes with time alone is not asked.
+
+    bent, freed  all that every vehicle has, on all pieces and on those that are left
+    """
+    beside = {*IN_TIME, *SCANS, *bent.names}
+    names = [one.name for one in fitter.candidates if one.name not in beside and not one.changes]
+    gains = [gain(fitter, bent, name, [], is_thorough=True) for name in names]
+    gains += [one for name, one in form_gains(fitter, bent).items() if name not in beside]
+    rows = sum(np.isfinite(e).sum(axis=1) for e in bent.fit.whitened)
+    possible = float(np.sum(rows * (1.0 - freed.fit.noise[:2] / bent.fit.noise[:2])))
+    return max(gains) / possible
 
 
 def _left(fitter: Fitter, whole: Explanation) -> Array:
