@@ -33,6 +33,16 @@ def test_an_excerpt_is_of_the_pieces_where_the_plane_moves_most(monkeypatch: pyt
     np.testing.assert_array_equal(pieces[0].depth, first.depth[at])
 
 
+def test_what_leads_is_a_shorter_one_of_what_is_half_as_long_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spans, "LED", 600)
+    monkeypatch.setattr(spans, "LED_PIECE", 300)
+    dive = hidden_dive(duration=91.0)
+    dive.rudder[:300] *= 0.1
+    short = [dive.between(0.0, 89.95)]
+    assert spans.led_excerpt(short) is short
+    assert [piece.time[0] for piece in spans.led_excerpt([dive])] == pytest.approx([30.3, 60.7], abs=0.2)
+
+
 def test_what_is_not_measured_comes_last(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(spans, "LONG", 500)
     monkeypatch.setattr(spans, "EXCERPT", 300)

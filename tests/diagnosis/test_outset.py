@@ -34,7 +34,7 @@ from host.diagnosis.search.outset import (
 from host.diagnosis.search.search import Search
 from host.diagnosis.search.whole_vehicle import ended
 from host.recordings.read import read_recordings
-from host.recordings.recording import Array
+from host.recordings.recording import Array, Recording
 from host.vehicle import default_vehicle
 from tools.sitl.recording import write_csv
 from tools.trial.deck import Card
@@ -71,6 +71,23 @@ def test_of_a_real_vehicle_all_that_every_one_has_leaves_nothing(real: Fitter) -
     assert real.excess(real.root.fit) > 10.0
     assert real.excess(found.fit) < LITTLE
     assert found.leaves_white
+
+
+def test_what_leaves_nothing_of_an_excerpt_goes_on_from_there(
+    real: Fitter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def halves(runs: list[Recording]) -> list[Recording]:
+        (run,) = runs
+        middle = run.time[run.time.size // 2]
+        return [run.between(-np.inf, middle), run.between(middle, np.inf)]
+
+    monkeypatch.setattr(outset, "led_excerpt", halves)
+    led = outset._as_a_part_tells(real, outset.names_of_all(real))
+    assert led is not None
+    assert len(led.fit.initial) == len(real.recordings)
+    assert real.excess(led.fit) < LITTLE
+    monkeypatch.setattr(outset, "ends_of", lambda part, _: iter([part.root]))
+    assert outset._as_a_part_tells(real, outset.names_of_all(real)) is None
 
 
 def test_where_something_else_acts_as_well_it_leaves_far_less(

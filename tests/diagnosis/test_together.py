@@ -215,3 +215,29 @@ def test_what_led_nowhere_beside_less_is_not_tried_beside_more(monkeypatch: pyte
     search = Rounds([10.4], True, monkeypatch)
     best = SimpleNamespace(names=frozenset(range(10, 16)), fit=9.0, bic=-1.0)
     assert completed(search, best) is best  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("left", "is_led"), [(MUCH - 0.1, True), (MUCH + 0.1, False)])
+def test_a_continuation_goes_through_an_excerpt_of_which_it_leaves_little(
+    left: float, is_led: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Part:
+        def __init__(self, recordings: list[Any]) -> None:
+            self.recordings, self.wander = recordings, np.zeros(0)
+
+        def excess(self, fit: float) -> float:
+            return fit
+
+    found, whole = SimpleNamespace(fit=left), SimpleNamespace()
+    search: Any = SimpleNamespace(
+        fitter=SimpleNamespace(recordings=["all"], wander=np.zeros(0), refitted=lambda one: (one, whole)),
+        workers=SimpleNamespace(jobs=1),
+        elsewhere=lambda fitter, _: fitter.recordings,
+    )
+    monkeypatch.setattr(module, "Fitter", Part)
+    monkeypatch.setattr(module, "led_excerpt", lambda _: ["piece"])
+    monkeypatch.setattr(module, "continued", lambda runs, *_: found if runs == ["piece"] else None)
+    end: Any = module._continued_through_a_part(search, frozenset())
+    assert end == ((found, whole) if is_led else None)
+    monkeypatch.setattr(module, "led_excerpt", lambda runs: runs)
+    assert module._continued_through_a_part(search, frozenset()) is None
