@@ -107,6 +107,7 @@ def diagnose(
     jobs: int = 1,
     like: Explanation | None = None,
     may_be_quiet: bool = False,
+    may_leave_out: bool = True,
 ) -> Diagnosis:
     """Finds what the paper's equations lack on these recordings of one vehicle, on `jobs` cores.
 
@@ -115,6 +116,7 @@ def diagnose(
 
     like  an explanation of a vehicle that this one should resemble: if of many effects, it is begun with
     may_be_quiet  whether recordings that are smoother than sensors are taken as they are
+    may_leave_out  whether stretches in which other physics comes and goes are left out of one recording
 
     Raises RecordingError with one line where a recording is too short, or pitch or depth never changes, is
     hardly ever read or has the wrong sign.
@@ -126,7 +128,6 @@ def diagnose(
     seen = noted(seen, units_note(seen))
     seen = seen if may_be_quiet else as_sensed(seen)
     seen = with_plane_moments(seen, on_progress)
-    may_leave_out = like is None and not may_be_quiet
     first, *others = likelier_first(ways(seen), on_progress, jobs, may_leave_out)
     return _diagnosed(first, others, on_progress, jobs, like, [])
 

@@ -49,11 +49,15 @@ def test_what_an_effect_would_explain_is_not_apart(monkeypatch: pytest.MonkeyPat
     assert stretches_apart([hidden_dive(turning, duration=250.0)]) == []
 
 
-def test_short_recordings_several_and_alarms_are_taken_whole() -> None:
+def test_short_and_long_recordings_several_and_alarms_are_taken_whole(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     dive = hidden_dive(turning, duration=250.0)
     assert stretches_apart([dive.between(0.0, 150.0)]) == []
     assert stretches_apart([dive, replace(dive, name="other.csv")]) == []
     assert stretches_apart([replace(dive, alarms=(BEGINS,))]) == []
+    monkeypatch.setattr(apart, "MOST_ROWS", dive.time.size - 1)
+    assert stretches_apart([dive]) == []
 
 
 def test_what_is_apart_is_left_out_and_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -87,7 +87,9 @@ def run(args: argparse.Namespace) -> int:
         if args.simulation is not None:
             simulated = read_all([args.simulation], vehicle, say)
             check_same_flight(recordings, simulated)
-        answer = Answer(found=diagnose(recordings, say, jobs))
+        # What a simulation is set against is taken whole: its rows are those of the recording.
+        may_leave_out = args.simulation is None
+        answer = Answer(found=diagnose(recordings, say, jobs, may_leave_out=may_leave_out))
         if model is not None:
             say("against the model")
             answer = against_model(answer.found, model, args.model.name)

@@ -44,7 +44,12 @@ def against_simulation(
     noise = np.minimum(np.maximum(QUIET**2 * found.floor, QUIETEST**2), found.floor)
     quiet = _through_sensors_of(found.recordings, simulated, noise)
     theirs = diagnose(
-        quiet, lambda stage: on_progress(f"simulation: {stage}"), jobs, found.extended, may_be_quiet=True
+        quiet,
+        lambda stage: on_progress(f"simulation: {stage}"),
+        jobs,
+        found.extended,
+        may_be_quiet=True,
+        may_leave_out=False,
     )
     on_progress("simulation against recording")
     inside = contained(Fitter(theirs.recordings, known=theirs.extended), theirs.extended, found.extended)

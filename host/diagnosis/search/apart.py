@@ -19,7 +19,7 @@ from host.recordings.left_out import Span
 from host.recordings.recording import Array, Recording
 
 PIECE, LEAST_ROWS = 25.0, 100  # s and rows of a piece, at least
-LEAST_PIECES = 8
+LEAST_PIECES, MOST_ROWS = 8, 12_000  # what is longer takes minutes
 MOST = 0.35  # of all pieces, that may be apart
 WORSE = 1.35  # times what the median piece leaves, and the noise floor: four deviations of 250 rows
 AT_ONCE = 0.4  # of what the worst leaves: what is less bad may only be bent by that
@@ -34,7 +34,10 @@ def stretches_apart(recordings: list[Recording]) -> list[Span]:
     """
     pieces = [piece for recording in recordings for piece in _pieces(recording)]
     names = {recording.name for recording in recordings}
-    if len(pieces) < LEAST_PIECES or len(names) > 1 or any(recording.alarms for recording in recordings):
+    rows = sum(recording.time.size for recording in recordings)
+    if len(pieces) < LEAST_PIECES or rows > MOST_ROWS or len(names) > 1:
+        return []
+    if any(recording.alarms for recording in recordings):
         return []
     kept = pieces
     for number in range(MOST_ROUNDS):
