@@ -219,8 +219,8 @@ def _apart(way: Way) -> str:
     if not way.apart:
         return ""
     return (
-        f"From {spans_told(way.apart)} other physics acts that comes and goes (turns, say): that was left "
-        "out, and what follows is of the rest."
+        f"From {spans_told(way.apart)} other physics acts that comes and goes (turns or another thrust, "
+        "say): that was left out, and what follows is of the rest."
     )
 
 

@@ -49,19 +49,6 @@ def test_what_an_effect_would_explain_is_not_apart(monkeypatch: pytest.MonkeyPat
     assert stretches_apart([hidden_dive(turning, duration=250.0)]) == []
 
 
-@pytest.mark.parametrize(("speed_time", "are_own"), [(30.0, False), (600.0, True)])
-@pytest.mark.parametrize("has_speed", [True, False])
-def test_pieces_that_keep_speeds_of_their_own_have_another_thrust(
-    speed_time: float, are_own: bool, has_speed: bool
-) -> None:
-    names = structure_of(("speed_loss",)).names
-    values = np.array([speed_time if name == "speed_time" else 0.0 for name in names])
-    fit = SimpleNamespace(structure=SimpleNamespace(names=names), parameters=values)
-    fitter = SimpleNamespace(recordings=[SimpleNamespace(has_speed=has_speed)])
-    found = apart._has_own_speeds(cast("Any", fitter), cast("Any", SimpleNamespace(fit=fit)))
-    assert found == (are_own and not has_speed)
-
-
 def test_short_and_long_recordings_several_and_alarms_are_taken_whole(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -5,9 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from host.catalogue import structure_of
+from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.proof import foretold
 from host.diagnosis.proof.foretold import foretold_errors
 from host.diagnosis.proof.scoring import misfit
 from host.diagnosis.recordings.spans import divide
+from host.dynamics.propagate import free_run, inputs_of
+from tests.diagnosis.hidden_dive import BASE, hidden_dive
 from tests.diagnosis.test_unstable_hull import NOISE, flown
 
 
@@ -53,3 +59,23 @@ def test_no_stretch_is_told_by_what_comes_after_it() -> None:
     other.pitch[late] += 1.0
     before = foretold_errors(known, recording, 4.0)[:, ~late]
     assert np.array_equal(foretold_errors(known, other, 4.0)[:, ~late], before, equal_nan=True)
+
+
+@pytest.mark.parametrize("is_spread", [True, False])
+def test_a_filter_finds_the_speed_at_which_a_recording_begins(
+    is_spread: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(foretold, "FIRST_LOSS", foretold.FIRST_LOSS * is_spread)
+    dive = hidden_dive(duration=120.0)
+    structure = structure_of(("speed_loss",))
+    known = dict.fromkeys(structure.names, 0.0) | BASE | {"speed_time": 1000.0}
+    values = np.array([known[name] for name in structure.names])
+    run = free_run(values, np.array([0.0, 0.0, 0.0, 20.0, 0.6]), inputs_of(dive, structure))
+    rng = np.random.default_rng(3)
+    pitch, depth = run.outputs + NOISE * rng.standard_normal(run.outputs.shape)
+    fitter = Fitter([replace(dive, pitch=pitch, depth=depth)])
+    noise = np.array([*fitter.floor, 1e-8, 1e-8])
+    fit = replace(fitter.base.fit, structure=structure, parameters=values, noise=noise)
+    errors = foretold_errors(Explanation(structure.effect_names, fit, 0.0), fitter.recordings[0], 5.0)
+    late = np.nanmean(errors[:, 600:] ** 2, axis=1) / NOISE.ravel() ** 2
+    assert (late < 2.0).all() == is_spread

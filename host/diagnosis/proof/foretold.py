@@ -14,6 +14,7 @@ from host.likelihood.kalman import kalman_pass
 from host.recordings.recording import Array, Recording
 
 FIRST_SPREAD = (0.5, 0.5, 0.2, 2.0)  # of w, q, theta and zeta, SI: the filter begins anywhere
+FIRST_LOSS = 0.5  # m/s, of the speed where none is measured
 
 
 def foretold_errors(explanation: Explanation, recording: Recording, horizon: float) -> Array:
@@ -42,4 +43,6 @@ def following(fit: Fit, initial: Array, inputs: Inputs) -> Array:
     """Gains (2 nx, N) of a Kalman filter that begins near this state (5,), under the fit's random forces."""
     spread = np.zeros(len(fit.structure.states))
     spread[: len(FIRST_SPREAD)] = np.square(FIRST_SPREAD)
+    if "speed_loss" in fit.structure.states:
+        spread[fit.structure.states.index("speed_loss")] = FIRST_LOSS**2
     return kalman_pass(fit.parameters, initial, fit.noise, inputs, spread).gains

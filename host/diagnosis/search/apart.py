@@ -1,5 +1,6 @@
 """Stretches in which other physics acts, that comes and goes: turns, say, whose roll and yaw carry pitch.
 
+Or a thrust that changes where no speed is measured: each stretch that is left begins at a speed of its own.
 A free run through them ends far from where the vehicle is, and no effect of the vertical plane explains it.
 Over short pieces, each with a start of its own, all that every vehicle has explains the others: the worst are
 left out until it does (least trimmed squares: Rousseeuw, J. Am. Stat. Assoc. 79, 1984).
@@ -24,7 +25,6 @@ MOST = 0.35  # of all pieces, that may be apart
 WORSE = 1.35  # times what the median piece leaves, and the noise floor: four deviations of 250 rows
 AT_ONCE = 0.4  # of what the worst leaves: what is less bad may only be bent by that
 MOST_ROUNDS = 6
-COASTING = 10.0  # times a piece, for which no vehicle of a few metres keeps a speed that it cannot hold
 SHARE = 0.5  # of what leaving out does, that no effect promises to do
 
 
@@ -58,7 +58,7 @@ def stretches_apart(recordings: list[Recording]) -> list[Span]:
     starts = {piece.time[0] for piece in kept}
     if len(kept) == len(pieces) or pieces[-1].time[0] not in starts:
         return []
-    if _has_own_speeds(fitter, whole) or _share_of_an_effect(*all_of_them, whole) > SHARE:
+    if _share_of_an_effect(*all_of_them, whole) > SHARE:
         return []
     return _joined([piece for piece in pieces if piece.time[0] not in starts])
 
@@ -79,14 +79,6 @@ def _best_of_all(fitter: Fitter) -> Explanation:
         if says_all(fitter, best):
             break
     return best
-
-
-def _has_own_speeds(fitter: Fitter, whole: Explanation) -> bool:
-    """Whether each piece keeps the speed it begins with: then thrust changed, and nothing came and went."""
-    names = whole.fit.structure.names
-    if fitter.recordings[0].has_speed or "speed_time" not in names:
-        return False
-    return bool(whole.fit.parameters[names.index("speed_time")] > COASTING * PIECE)
 
 
 def _share_of_an_effect(fitter: Fitter, bent: Explanation, freed: Explanation) -> float:
