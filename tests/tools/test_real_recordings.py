@@ -38,7 +38,7 @@ def test_a_glider_is_identified_and_its_battery_moment_called_open(
     assert main(["predict", str(tmp_path / "model.json"), str(recording), *options]) == 0
     assert left_out in capsys.readouterr().err
 
-    def diagnose(recordings: list[Recording], *_: object) -> None:
+    def diagnose(recordings: list[Recording], *_: object, **__: object) -> None:
         raise RecordingError(recordings[0].notes[-1])
 
     monkeypatch.setattr("host.diagnosis.diagnose.diagnose", diagnose)
