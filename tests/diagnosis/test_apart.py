@@ -44,6 +44,13 @@ def test_a_turn_is_apart_and_what_stays_is_not(extra: Extra, is_apart: bool) -> 
         assert ENDS - 2.0 < end < ENDS + 1.5 * apart.PIECE
 
 
+def test_a_sensor_that_was_silent_for_a_while_is_no_stretch_apart() -> None:
+    dive = hidden_dive(turning, duration=250.0)
+    dive.pitch[300:600], dive.depth[:20] = np.nan, np.nan
+    ((start, end),) = stretches_apart([dive])
+    assert BEGINS - apart.PIECE < start < end < ENDS + 1.5 * apart.PIECE
+
+
 def test_what_an_effect_would_explain_is_not_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(apart, "gain", lambda *_, **__: 1e9)
     assert stretches_apart([hidden_dive(turning, duration=250.0)]) == []

@@ -52,11 +52,11 @@ def divide(recordings: list[Recording]) -> Spans:
         kept = recording
         for start, end in _set_aside(recording):
             piece = recording.between(start, end)
-            if _is_measured(piece):
+            if is_measured(piece):
                 judging.append(piece)
                 kept = _blanked(kept, start, end)
         for run, whole in zip(_runs(kept), _runs(recording), strict=True):
-            if _is_measured(run):
+            if is_measured(run):
                 teaching.append(_begun(run))
                 unseen.append(_less(whole.between(teaching[-1].time[0], inf), teaching[-1]))
     return Spans(teaching, judging, unseen if judging else [])
@@ -87,15 +87,16 @@ def _most_moved(
     teaching: list[Recording], like: list[Recording], most: int, least_piece: int
 ) -> list[Recording]:
     parts, judged = (
-        [part for run in runs for part in _pieces(run, least_piece)] for runs in (teaching, like)
+        [part for run in runs for part in pieces_of(run, least_piece)] for runs in (teaching, like)
     )
-    ordered = np.argsort([-float(np.std(part.rudder)) * _is_measured(part) for part in judged])
+    ordered = np.argsort([-float(np.std(part.rudder)) * is_measured(part) for part in judged])
     rows = np.cumsum([parts[k].time.size for k in ordered])
     chosen = ordered[: 1 + int(np.searchsorted(rows, most))]
     return [parts[k] for k in sorted(chosen)]
 
 
-def _pieces(run: Recording, least: int) -> list[Recording]:
+def pieces_of(run: Recording, least: int) -> list[Recording]:
+    """The run in pieces of equal length, of at least so many rows."""
     edges = np.linspace(run.time[0], run.time[-1] + run.step, 1 + max(1, run.time.size // least))
     return [_begun(run.between(float(start), float(end))) for start, end in pairwise(edges)]
 
@@ -134,7 +135,7 @@ def _readings(recording: Recording) -> int:
     return int(min(np.isfinite(recording.depth).sum(), np.isfinite(recording.pitch).sum()))
 
 
-def _is_measured(recording: Recording) -> bool:
+def is_measured(recording: Recording) -> bool:
     return _readings(recording) >= LEAST_MEASURED
 
 

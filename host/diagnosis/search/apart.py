@@ -6,7 +6,7 @@ Over short pieces, each with a start of its own, all that every vehicle has expl
 left out until it does (least trimmed squares: Rousseeuw, J. Am. Stat. Assoc. 79, 1984).
 """
 
-from itertools import pairwise
+from math import inf
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LITTLE
 from host.diagnosis.fits.prospects import form_gains, gain
+from host.diagnosis.recordings.spans import is_measured, pieces_of
 from host.diagnosis.search.outset import IN_TIME, ends_of, names_of_all, says_all
 from host.recordings.left_out import Span
 from host.recordings.recording import Array, Recording
@@ -33,7 +34,8 @@ def stretches_apart(recordings: list[Recording]) -> list[Span]:
 
     None where they are many, or last until the end: what changed and never comes back is in the catalogue.
     """
-    pieces = [piece for recording in recordings for piece in _pieces(recording)]
+    cut = [piece for one in recordings for piece in pieces_of(one, max(LEAST_ROWS, round(PIECE / one.step)))]
+    pieces = [piece for piece in cut if is_measured(piece)]
     names = {recording.name for recording in recordings}
     rows = sum(recording.time.size for recording in recordings)
     if len(pieces) < LEAST_PIECES or rows > MOST_ROWS or len(names) > 1:
@@ -63,14 +65,6 @@ def stretches_apart(recordings: list[Recording]) -> list[Span]:
     return _joined([piece for piece in pieces if piece.time[0] not in starts])
 
 
-def _pieces(recording: Recording) -> list[Recording]:
-    rows = max(LEAST_ROWS, round(PIECE / recording.step))
-    edges = np.linspace(
-        recording.time[0], recording.time[-1] + recording.step, 1 + max(1, recording.time.size // rows)
-    )
-    return [recording.between(float(start), float(end)) for start, end in pairwise(edges)]
-
-
 def _best_of_all(fitter: Fitter) -> Explanation:
     """The root with all that every vehicle has, from the first start that leaves nothing, or the best."""
     best = fitter.root
@@ -94,7 +88,7 @@ def _share_of_an_effect(fitter: Fitter, bent: Explanation, freed: Explanation) -
     gains += [one for name, one in form_gains(fitter, bent).items() if name not in beside]
     rows = sum(np.isfinite(e).sum(axis=1) for e in bent.fit.whitened)
     possible = float(np.sum(rows * (1.0 - freed.fit.noise[:2] / bent.fit.noise[:2])))
-    return max(gains) / possible
+    return max(gains) / possible if possible > 0.0 else inf
 
 
 def _left(fitter: Fitter, whole: Explanation) -> Array:
