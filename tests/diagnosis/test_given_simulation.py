@@ -11,7 +11,7 @@ from hidden_dive import hidden_dive
 
 from host.diagnosis.against.comparison import Comparison, EffectDifference, sentences
 from host.diagnosis.against.contained import contained
-from host.diagnosis.against.given_simulation import against_simulation, check_same_flight
+from host.diagnosis.against.given_simulation import against_simulation, check_same_flight, untold_in
 from host.diagnosis.against.other_side import Side, at_speed
 from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import Diagnosis
@@ -167,6 +167,14 @@ def test_a_trace_of_an_effect_is_none_of_it(ours: Explanation) -> None:
     quiet = Fitter([hidden_dive(lambda _, x, __: (0.05 * x[1], 0.0, 0.0), seed=1, noise=0.1)])
     assert grown(quiet, "heave_pitch_rate_coupling").bic < quiet.base.bic
     assert not contained(quiet, quiet.base, ours).names
+
+
+def test_a_simulation_that_tells_its_speed_says_nothing_of_what_slows_it(ours: Explanation) -> None:
+    dive = hidden_dive(drag, seed=1)
+    told = replace(dive, speed=np.full(dive.time.size, 2.5))
+    assert untold_in([told], ours) == {"speed_loss"}
+    assert not untold_in([told], replace(ours, names=ours.names | {"speed_loss"}))
+    assert not untold_in([dive], ours)
 
 
 def test_a_simulation_in_finer_steps_is_read_at_the_recorded_rows(coupled: Diagnosis) -> None:

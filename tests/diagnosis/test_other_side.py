@@ -47,6 +47,12 @@ def test_a_side_that_is_off_by_more_than_our_own_freedom_differs(fitter: Fitter)
     assert not compare(fitter, own, side(c_wq=1.2)).is_equal
 
 
+def test_of_what_nothing_is_known_on_the_other_side_there_is_no_difference(fitter: Fitter) -> None:
+    own = fitter.polished(fitter.grown(fitter.base, "heave_pitch_rate_coupling", []))
+    assert [effect.status for effect in compare(fitter, own, side()).effects] == ["missing"]
+    assert not compare(fitter, own, side(), untold=own.names).effects
+
+
 def test_ours_give_way_to_what_does_their_work(fitter: Fitter, mistaken: Explanation) -> None:
     told = in_words_of(fitter, mistaken, side(c_wq=1.2))
     assert told.names == {"heave_pitch_rate_coupling"}

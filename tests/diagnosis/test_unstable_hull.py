@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from host.catalogue import structure_of
+from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.disturbances.seas import Explained, again_astray, led_astray
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
@@ -14,10 +15,12 @@ from host.diagnosis.fits.leftover import leftover
 from host.diagnosis.fits.setting import SLIGHT
 from host.diagnosis.fits.speed_forces import densities
 from host.diagnosis.fits.workers import Workers
+from host.diagnosis.search.outset import FAR_LESS
 from host.diagnosis.search.search import FAR_LIKELIER, LOST, Search
 from host.dynamics.propagate import free_run, inputs_of
 from host.likelihood.gauss_newton import Point
 from host.likelihood.output_error import output_error
+from host.recordings.recording import Array
 from tests.diagnosis.hidden_dive import hidden_dive
 
 NAMES = frozenset(
@@ -114,3 +117,25 @@ def test_forces_that_are_not_slight_beside_a_free_run_that_is_lost(
             bic=best.bic - likelier * FAR_LIKELIER * best.fit.samples,
         )
         assert search.is_pushed_about == search.is_led_elsewhere == is_pushed
+
+
+@pytest.mark.parametrize(("left", "is_pushed"), [(0.5, False), (2.0, True)])
+def test_a_plane_that_is_kept_back_is_no_matter_of_forces(left: float, is_pushed: bool) -> None:
+    fitter, best = flown(0.0)
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        lost = np.array([*(2.0 * LOST * fitter.floor), 0.0, 0.0])
+        search.joint.add(search.remember(replace(best, fit=replace(best.fit, noise=lost))).names)
+        forces = np.array([*fitter.floor, *(2.0 * SLIGHT * np.square(fitter.accelerations))])
+        bic = best.bic - 3.0 * FAR_LIKELIER * best.fit.samples
+        search.steered = replace(best, fit=replace(best.fit, noise=forces), bic=bic)
+        assert search.is_pushed_about
+        held = replace(best.fit, noise=left * FAR_LESS * fitter.excess(fitter.root.fit) * _sensors(fitter))
+        names = frozenset({"actuator_rate_limit", FREE_TRIM.name})
+        search.remember(Explanation(names, held, best.bic - 1.0))
+        assert search.is_pushed_about == is_pushed
+
+
+def _sensors(fitter: Fitter) -> Array:
+    """Levels of the sensors' noise alone."""
+    return np.array([*fitter.floor, 0.0, 0.0])

@@ -18,7 +18,7 @@ from scipy.stats import chi2
 
 from host.catalogue import named
 from host.diagnosis.against.other_side import TOOLS, Side, Value, at_speed, in_words_of, side_of, there
-from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import NAMING_MARGIN
 from host.diagnosis.fits.setting import SURGE
@@ -79,17 +79,24 @@ class Comparison:
 
 
 def compare(
-    fitter: Fitter, own: Explanation, other: Side, std: Mapping[str, float] = NOTHING_KNOWN
+    fitter: Fitter,
+    own: Explanation,
+    other: Side,
+    std: Mapping[str, float] = NOTHING_KNOWN,
+    untold: Names = frozenset(),
 ) -> Comparison:
     """Sets the explanation of the fitter's recordings against the other side.
 
     Where forces follow a measured speed, both are told at the recordings' own.
 
-    std  the least deviations of our coefficients: those that know of what else every vehicle has, too little
-         to be named, which the other side may hold
+    std     the least deviations of our coefficients: those that know of what else every vehicle has, too
+            little to be named, which the other side may hold
+    untold  effects of which nothing is known on the other side: they are no difference
     """
     # A speed taken as it was measured says nothing of what changes it.
-    untold = SURGE if all(other.values.get(name) == (value, 0.0) for name, value in SURGE.items()) else {}
+    not_estimated = (
+        SURGE if all(other.values.get(name) == (value, 0.0) for name, value in SURGE.items()) else {}
+    )
     is_speed_told = fitter.recordings[0].has_speed and other.values["u0"][0] > 0.0
     if is_speed_told and "speed_loss" in own.names | other.names:
         other = at_speed(other, fitter.held["u0"])
@@ -102,7 +109,7 @@ def compare(
     plain = side_of(joint).values
     recorded = {key: (value, max(least, std.get(key, 0.0))) for key, (value, least) in plain.items()}
     effects = []
-    for name in joint.names - TOOLS:
+    for name in joint.names - TOOLS - untold:
         mine = {parameter.name: recorded[parameter.name] for parameter in named(name).parameters}
         worth = fitter.polished(fitter.shrunk(joint, name)).bic - joint.bic
         if name not in other.names:
@@ -111,7 +118,7 @@ def compare(
             )
             continue
         given = other.of(name)
-        compared = [key for key in given if is_free[key] and key not in untold]
+        compared = [key for key in given if is_free[key] and key not in not_estimated]
         cost = _cost(fitter, joint, {key: given[key] for key in compared})
         cost /= _doubt(plain, mine, given, compared)
         status: Status = "same"

@@ -17,6 +17,7 @@ from host.diagnosis.against.contained import contained
 from host.diagnosis.against.other_side import side_of
 from host.diagnosis.answer import Against, Answer
 from host.diagnosis.diagnose import Diagnosis, diagnose
+from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.leftover import leftover
 from host.errors import RecordingError
@@ -54,7 +55,7 @@ def against_simulation(
     on_progress("simulation against recording")
     inside = contained(Fitter(theirs.recordings, known=theirs.extended), theirs.extended, found.extended)
     fitter = Fitter(found.recordings, known=found.extended)
-    comparison = compare(fitter, found.extended, side_of(inside), found.std)
+    comparison = compare(fitter, found.extended, side_of(inside), found.std, untold_in(quiet, inside))
     # A simulator may do more than the catalogue knows; it matters where the sensors would show it.
     seen = _as_steered(theirs, _through_sensors_of(found.recordings, simulated, found.floor))
     own = Fitter(seen, known=inside)
@@ -83,6 +84,12 @@ def against_simulation(
         is_understood=leftover(own, own.polished(inside)).is_nothing,
     )
     return Answer(found=found, against=against)
+
+
+def untold_in(simulated: list[Recording], inside: Explanation) -> Names:
+    """What a simulation that tells its speed says nothing of: its speed is taken as it came about."""
+    is_known = simulated[0].has_speed and "speed_loss" not in inside.names
+    return frozenset({"speed_loss"} if is_known else ())
 
 
 def check_same_flight(recordings: list[Recording], simulated: list[Recording]) -> None:
