@@ -60,6 +60,14 @@ FAINT = ("heave_pitch_acceleration_coupling", "plane_in_cross_flow", "speed_inde
 """What every vehicle has, too, but too weak to be found before all that is ordinary is there."""
 ALONG_THE_HULL = "drag_along_the_hull"
 """Of every long hull, but of no simulator that knows two drags only."""
+DRIVE = (
+    "actuator_backlash",
+    "actuator_rate_limit",
+    "actuator_saturation",
+    "actuator_delay",
+    "rudder_stall",
+)
+"""What may keep a plane from where it is commanded to: then no hull follows the commands."""
 OVER_GROUND = "speed_over_ground"
 """Of moving water, where the speed was measured against the bottom, or by a simulator."""
 

@@ -147,7 +147,7 @@ def test_a_long_hull_that_meets_the_water_differently_at_either_end(rows: int) -
 
 
 def begun_with(fitter: Fitter, values: Hull, share: float) -> Point:
-    at = module._begun(fitter, NAMES, fitter.speed)
+    at = module._begun(fitter, NAMES, fitter.speed, {})
     own = zip(at.structure.names, at.parameters, strict=True)
     known = np.array([values.get(name, value) for name, value in own])
     return module._forced(fitter, replace(at, parameters=known), share)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hidden_dive import hidden_dive
 
-from host.catalogue import ALONG_THE_HULL, FAINT, ORDINARY
+from host.catalogue import ALONG_THE_HULL, DRIVE, FAINT, ORDINARY
 from host.catalogue.kin import OFFSETS
 from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
@@ -23,7 +23,6 @@ from host.diagnosis.plane_choice import Way, likelier_first
 from host.diagnosis.search import outset
 from host.diagnosis.search import search as module
 from host.diagnosis.search.outset import (
-    DRIVE,
     FAR_LESS,
     IN_TIME,
     LOST,

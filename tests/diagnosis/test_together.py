@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hidden_dive import BASE, hidden_dive
 
-from host.catalogue import structure_of
+from host.catalogue import ORDINARY, structure_of
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import MUCH
 from host.diagnosis.fits.workers import Workers
@@ -237,7 +237,31 @@ def test_a_continuation_goes_through_an_excerpt_of_which_it_leaves_little(
     monkeypatch.setattr(module, "Fitter", Part)
     monkeypatch.setattr(module, "led_excerpt", lambda _: ["piece"])
     monkeypatch.setattr(module, "continued", lambda runs, *_: found if runs == ["piece"] else None)
-    end: Any = module._continued_through_a_part(search, frozenset())
+    end: Any = module._continued_through_a_part(search, frozenset(), {})
     assert end == ((found, whole) if is_led else None)
     monkeypatch.setattr(module, "led_excerpt", lambda runs: runs)
-    assert module._continued_through_a_part(search, frozenset()) is None
+    assert module._continued_through_a_part(search, frozenset(), {}) is None
+
+
+def test_a_continuation_holds_what_keeps_the_plane_back_from_the_start(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    structure = structure_of(frozenset({"actuator_rate_limit", "internal_wave", "free_trim"}))
+    values = np.arange(1.0, len(structure.names) + 1.0)
+    fit = SimpleNamespace(structure=structure, parameters=values)
+    asked: list[Any] = []
+    monkeypatch.setattr(module, "continued", lambda *told: asked.append(told[1:]))
+    monkeypatch.setattr(module, "_continued_through_a_part", lambda *told: asked.append(told[1:2]))
+    search: Any = SimpleNamespace(
+        on_progress=lambda _: None,
+        fitter=SimpleNamespace(tools_beside=lambda _: ()),
+        fault_of_the_drive=SimpleNamespace(names=frozenset(structure.effect_names), fit=fit),
+    )
+    assert module._by_continuation(search) is None
+    (of_the_part,), (of_all, _, known) = asked
+    assert of_the_part == of_all == {*ORDINARY, "free_trim", "actuator_rate_limit"}
+    assert known == {"plane_rate": values[structure.names.index("plane_rate")]}
+    asked.clear()
+    search.fault_of_the_drive = None
+    assert module._by_continuation(search) is None
+    assert asked[1][0] == {*ORDINARY, "free_trim"}

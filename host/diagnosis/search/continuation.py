@@ -10,6 +10,7 @@ rest before it seems to be lacking, so the first stage is asked at once; and two
 seems to be lacking later may be the other one.
 """
 
+from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -45,20 +46,25 @@ FAR_MORE = 3.0  # times what was left when no effect helped: fewer forces make u
 SLIGHTLY = 1.05  # times the variance expected: enough for another look at the moments
 FEW_STEPS, STEPS = 10, 40  # of the parameters at one stage: many lie along a ridge, where a stage is slow
 SPEED = NAMES.index("u0")
+Values = Mapping[str, float]
 APPARENT = ("pitch_bias", "vertical_current")
 """What no free trim does where heave is not linear, nor shows at one step from a set bent without them."""
 BEHIND = 0.1  # of BIC a sample, to the best of the same stage, or of all stages: it leads nowhere
 ROUGHLY = 0.3  # of the log-likelihood: under slight forces, which takes longest, a smaller step is the last
 
 
-def continued(search: "Search", names: Names, most_beside: int) -> Explanation | None:
+def continued(
+    search: "Search", names: Names, most_beside: int, known: Values | None = None
+) -> Explanation | None:
     """The set beside a bias and a current, with drag along the hull or not, and at most so many effects more.
 
     None where the filter loses the recording.
+
+    known  values with which parameters of its effects begin
     """
     names |= {*APPARENT}
     fitter, common = search.fitter, names | {ALONG_THE_HULL}
-    followed = _with_what_is_large(search, names)
+    followed = _with_what_is_large(search, names, known or {})
     swapped = [at for one in followed for at in with_poles_swapped(_at(one))]
     most, most_lost = LITTLE, NAMING_MARGIN  # without another look at what is lacking
     least = inf  # BIC so far: the true physics gets likelier with every stage
@@ -95,14 +101,14 @@ def _kept(search: "Search", followed: list[Explanation]) -> Explanation:
     return search.steered
 
 
-def _with_what_is_large(search: "Search", names: Names) -> list[Explanation]:
+def _with_what_is_large(search: "Search", names: Names, known: Values) -> list[Explanation]:
     """The set through the first stages, or with an effect that shows there, before it bends the rest.
 
     The speed that is likeliest without an effect may be one that does its work, so it is asked from all of
     them what gains; and until fewer forces are there another effect may gain more than the one at work.
     """
     fitter = search.fitter
-    begun = [_begun(fitter, names, speed) for speed in _speeds(fitter)]
+    begun = [_begun(fitter, names, speed, known) for speed in _speeds(fitter)]
     plain = _distinct(_steered(search, [_forced(fitter, point, STAGES[0]) for point in begun]))
     along = _distinct(_steered(search, [at for one in plain for at in _starts(search, one, ALONG_THE_HULL)]))
     followed = [*plain, *along]
@@ -223,8 +229,10 @@ def _climbed(fitter: "Fitter", point: Point, steps: int) -> Explanation:
     return fitter.explained(names, fit)
 
 
-def _begun(fitter: "Fitter", names: Names, speed: float) -> Point:
+def _begun(fitter: "Fitter", names: Names, speed: float, known: Values) -> Point:
     """The values of a regression at this speed, those of most vehicles, or none: no set is needed."""
     root, rough = fitter.root.fit, first_guess(fitter.thinned, speed, names)
-    known = dict(zip(root.structure.names, root.parameters.tolist(), strict=True))
-    return Point(structure_of(names), idle_values(fitter, names, known | rough), root.initial, root.levels)
+    values = dict(zip(root.structure.names, root.parameters.tolist(), strict=True)) | rough
+    return Point(
+        structure_of(names), idle_values(fitter, names, values | dict(known)), root.initial, root.levels
+    )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.catalogue import ALONG_THE_HULL, FAINT, ORDINARY
+from host.catalogue import ALONG_THE_HULL, DRIVE, FAINT, ORDINARY
 from host.catalogue.kin import OFFSETS
 from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
@@ -46,14 +46,6 @@ FAR_LIKELIER = 0.1  # of BIC a sample, under random forces
 FAIR_PART = 0.02  # of what these explain, that what is missing should gain even beside them
 TURNING = ("munk_moment", "heave_pitch_rate_coupling")
 LEADING = 3  # of what may lead, beside which all the rest is tried
-DRIVE = (
-    "actuator_backlash",
-    "actuator_rate_limit",
-    "actuator_saturation",
-    "actuator_delay",
-    "rudder_stall",
-)
-"""What may keep a plane from where it is commanded to: then no hull follows the commands."""
 IN_TIME = ("surface_waves", "internal_wave", "unknown_swinging_moment", *sorted(WANDERING))
 """What swings with one period, or wanders. Of a sea it follows a part: little must be left beside it."""
 

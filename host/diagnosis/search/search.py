@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from math import inf
 
-from host.catalogue import named
+from host.catalogue import DRIVE, named
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.fits.absence import promises_more
 from host.diagnosis.fits.explanation import Explanation, Names
@@ -23,7 +23,7 @@ from host.diagnosis.search.beam import beam_search, grown
 from host.diagnosis.search.candidates import candidates, other_changes
 from host.diagnosis.search.exchange import exchanged, twins
 from host.diagnosis.search.offset_choice import with_best_offsets, with_offsets_asked_again, with_one_offset
-from host.diagnosis.search.outset import DRIVE, FAR_LESS, goes_on_from
+from host.diagnosis.search.outset import FAR_LESS, goes_on_from
 from host.diagnosis.search.pruning import pruned
 from host.diagnosis.search.rarity import told_by_the_usual
 from host.diagnosis.search.together import completed, with_more
@@ -278,7 +278,7 @@ class Search:
         It may be unstable as well; turns push it, or what is not in the equations at all. A fault of the
         plane's drive that explains most of what moves it does not: then the search goes on beside that.
         """
-        if self.steered is None or not self._is_lost or self._is_led_by_the_drive:
+        if self.steered is None or not self._is_lost or self.fault_of_the_drive is not None:
             return False
         return (
             self.steered.bic
@@ -286,12 +286,13 @@ class Search:
         )
 
     @property
-    def _is_led_by_the_drive(self) -> bool:
-        """Whether a fault of the plane's drive, with little beside it, leaves far less than the root."""
+    def fault_of_the_drive(self) -> Explanation | None:
+        """The likeliest set of few, where one keeps the plane back and far less is left than by the root."""
         few = (e for e in self.tried.values() if len(e.names - {FREE_TRIM.name}) <= LARGEST_SET)
         leading = min(few, key=lambda e: e.bic, default=self.root)
         most = FAR_LESS * self.fitter.excess(self.root.fit)
-        return bool(leading.names & {*DRIVE}) and self.fitter.excess(leading.fit) < most
+        is_one = leading.names & {*DRIVE} and self.fitter.excess(leading.fit) < most
+        return leading if is_one else None
 
     @property
     def _is_lost(self) -> bool:

@@ -5,10 +5,11 @@ and a search that carries sets side by side costs most where sets are large. So 
 all that every vehicle has joins it, then what else promises most, and what does not pay is dropped at last.
 """
 
+from collections.abc import Mapping
 from math import inf, isfinite, log
 from typing import TYPE_CHECKING
 
-from host.catalogue import ORDINARY
+from host.catalogue import DRIVE, ORDINARY, named
 from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.fits.drift_fits import plain_drift
@@ -160,10 +161,16 @@ def _among_look_alikes(search: "Search", best: Explanation) -> Explanation:
 
 
 def _by_continuation(search: "Search") -> Explanation | None:
-    """All that every vehicle has, with little beside it; None where the filter loses the recording."""
+    """All that every vehicle has, with little beside it; None where the filter loses the recording.
+
+    With what keeps the plane back, where that leads: no force is to stand for that.
+    """
     search.on_progress("what every vehicle has, led by the measurements")
-    names = frozenset({*ORDINARY, FREE_TRIM.name, *search.fitter.tools_beside(frozenset(ORDINARY))})
-    found = _continued_through_a_part(search, names) or continued(search, names, MOST_BESIDE)
+    faults, known = _faults_of_the_drive(search)
+    names = frozenset({*ORDINARY, FREE_TRIM.name, *faults})
+    names |= {*search.fitter.tools_beside(names)}
+    found = _continued_through_a_part(search, names, known)
+    found = found or continued(search, names, MOST_BESIDE, known)
     if found is None:
         return None
     end = search.remember(search.fitter.polished(found))
@@ -171,14 +178,26 @@ def _by_continuation(search: "Search") -> Explanation | None:
     return end
 
 
-def _continued_through_a_part(search: "Search", names: Names) -> Explanation | None:
+def _faults_of_the_drive(search: "Search") -> tuple[Names, dict[str, float]]:
+    """What keeps the plane back, where that leads, and the values of its parameters."""
+    if (leading := search.fault_of_the_drive) is None:
+        return frozenset(), {}
+    names = leading.names & {*DRIVE}
+    own = {parameter.name for name in names for parameter in named(name).parameters}
+    pairs = zip(leading.fit.structure.names, leading.fit.parameters.tolist(), strict=True)
+    return names, {name: value for name, value in pairs if name in own}
+
+
+def _continued_through_a_part(
+    search: "Search", names: Names, known: Mapping[str, float]
+) -> Explanation | None:
     """The same through an excerpt, and from there on all; None where much is left of the excerpt."""
     pieces = led_excerpt(search.fitter.recordings)
     if pieces is search.fitter.recordings or search.fitter.wander.any():
         return None
     fitter = Fitter(pieces)
     with Workers(fitter, search.workers.jobs) as workers:
-        found = continued(search.elsewhere(fitter, workers), names, MOST_BESIDE)
+        found = continued(search.elsewhere(fitter, workers), names, MOST_BESIDE, known)
     if found is None or fitter.excess(found.fit) > MUCH:
         return None
     return search.fitter.refitted(found)
