@@ -17,6 +17,7 @@ from host.noise.speed import smoothed_speed
 from host.recordings.recording import Array, Recording, mean_speed
 
 LARGEST_FIT = 4000  # rows used per linear fit; more only cost time
+FARTHEST = (-12.0, 6.0)  # logarithms of a natural frequency, rad/s, and a damping ratio
 REST = 1e-3  # weight of an initial state of zero, in residuals: 1 mrad or 1 mm for a whole rad/s or m/s
 
 
@@ -181,7 +182,7 @@ def _pitch_valleys(stretches: list[_Stretch], slowest: float, fastest: float) ->
     """Natural frequency and damping ratio of the best pitch models, refined; one per distinct valley."""
 
     def cost(log_point: Array) -> float:
-        frequency, damping = np.exp(np.clip(log_point, -12.0, 6.0))
+        frequency, damping = np.exp(np.clip(log_point, *FARTHEST))
         return _pitch_model(stretches, -2.0 * damping * frequency, -(frequency**2)).cost
 
     grid = [
@@ -193,8 +194,9 @@ def _pitch_valleys(stretches: list[_Stretch], slowest: float, fastest: float) ->
     valleys: list[tuple[float, Array]] = []
     for point in (grid[0], next(g for g in grid if abs(g[0] - grid[0][0]) > 0.7)):
         found = minimize(cost, point, method="Nelder-Mead", options=dict(xatol=0.01, fatol=0.0, maxfev=50))
-        if all(np.max(np.abs(found.x - other)) > 0.3 for _, other in valleys):
-            valleys.append((found.fun, found.x))
+        end = np.clip(found.x, *FARTHEST)  # where pitch tells nothing a search runs away
+        if all(np.max(np.abs(end - other)) > 0.3 for _, other in valleys):
+            valleys.append((found.fun, end))
     valleys.sort(key=lambda valley: valley[0])
     near_best = [point for value, point in valleys if value <= 4.0 * valleys[0][0]]
     return [(float(np.exp(point[0])), float(np.exp(point[1]))) for point in near_best]

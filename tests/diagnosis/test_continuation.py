@@ -162,7 +162,7 @@ def test_a_hull_that_was_taken_for_a_slow_servo_is_asked_about_the_other_way_rou
     wrong |= {"a2": -10.4, "lag_time": 0.85}
     asked: list[Point] = []
 
-    def stuck(search: Search, names: Names) -> list[Explanation]:  # noqa: ARG001
+    def stuck(search: Search, names: Names, known: object) -> list[Explanation]:  # noqa: ARG001
         return [module._climbed(fitter, begun_with(fitter, wrong, STAGES[0]), 0)]
 
     def steered(_: Search, points: list[Point], steps: int = 0) -> list[Explanation]:  # noqa: ARG001

@@ -69,6 +69,18 @@ def test_the_summary_begins_with_the_difference(answer: Answer) -> None:
     assert summary(linear).startswith("The simulation lacks ")
 
 
+def test_the_summary_tells_what_makes_coefficients_differ(answer: Answer) -> None:
+    assert answer.against is not None
+    comparison = answer.against.comparison
+    stiff = [
+        replace(one, given=(2.0 * one.recorded[0], 0.0), is_different=True) if one.name == "a3" else one
+        for one in comparison.parameters
+    ]
+    against = replace(answer.against, comparison=replace(comparison, parameters=stiff))
+    said = summary(replace(answer, against=against))
+    assert "; it has too much heave quadratic drag; it has 2 times the righting moment. " in said
+
+
 def test_the_answer_in_the_file(answer: Answer) -> None:
     simulation = document(answer)["simulation"]
     assert simulation["file"] == "sim.csv"

@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from exact_dive import TABLE_1, Dive, fly
@@ -9,6 +11,7 @@ from host.dynamics.propagate import free_run, inputs_of
 from host.dynamics.sensitivities import innovations
 from host.identification.identifiability import undetermined
 from host.identification.uncertainty import covariance
+from host.likelihood import start_values
 from host.likelihood.maximum_likelihood import fit_maximum_likelihood
 from host.likelihood.output_error import RUNAWAY, diverges
 
@@ -26,6 +29,14 @@ def test_noise_free_recording_gives_the_vehicle_back() -> None:
     fit = fit_maximum_likelihood([recording])
     assert fit.converged
     assert np.allclose(fit.parameters, TRUTH, rtol=1e-3, atol=2e-5)
+
+
+def test_where_pitch_tells_nothing_a_start_that_runs_away_is_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    recording, _ = fly(Dive(duration=25.0))
+    ran_away = SimpleNamespace(x=np.array([900.0, 5.0]), fun=0.0)
+    monkeypatch.setattr(start_values, "minimize", lambda *_, **__: ran_away)
+    (found, *_) = start_values.start_values([recording])
+    assert np.isfinite(found[0]).all()
 
 
 def test_a_long_dive_of_a_vehicle_that_hardly_restores_itself_is_no_runaway() -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from host.catalogue import named
+from host.diagnosis.against.causes import CAUSES, Cause, causes
 from host.diagnosis.against.other_side import TOOLS, Side, Value, at_speed, in_words_of, side_of, there
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
@@ -71,6 +72,15 @@ class Comparison:
 
     def named(self, *status: Status) -> list[EffectDifference]:
         return [effect for effect in self.effects if effect.status in status]
+
+    @property
+    def causes(self) -> list[Cause]:
+        """What may make the different coefficients of the base equations so, at the same speed."""
+        different = {parameter.name for parameter in self.parameters if parameter.is_different}
+        if not different or "u0" in different:
+            return []
+        pairs = {one.name: (one.recorded, one.given) for one in self.parameters if one.name != "u0"}
+        return [cause for cause in causes(pairs) if different & CAUSES[cause.name].keys()]
 
     @property
     def is_equal(self) -> bool:
@@ -197,6 +207,7 @@ def as_json(found: Comparison, given: str) -> dict[str, Any]:
             }
             for one in found.parameters
         ],
+        "causes": [{"name": one.name, "ratio": one.ratio, "std": one.std} for one in found.causes],
     }
 
 
@@ -226,6 +237,11 @@ def sentences(found: Comparison, given: str) -> list[str]:
                 f"{_said(one.name, *one.given, units[one.name])} in the {given}, but "
                 f"{figure(*one.recorded)} in the recording."
             )
+    for cause in found.causes:
+        times = figure(cause.ratio, cause.std)
+        said.append(
+            f"That is as if the {given} had {times} times the {cause.title} that the recording shows."
+        )
     return said or [f"The {given} holds the physics that the recording shows, with the same coefficients."]
 
 

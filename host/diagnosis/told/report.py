@@ -128,6 +128,8 @@ def _difference(against: Against) -> str:
     said = [
         f"{verb} {_listed([title(e.name) for e in effects])}" for verb, effects in found.items() if effects
     ]
+    if causes := against.comparison.causes:
+        said.append(f"has {_listed([f'{one.ratio:.2g} times the {one.title}' for one in causes])}")
     return f"The simulation {'; it '.join(said) or 'has other coefficients'}. "
 
 
