@@ -56,15 +56,55 @@ def test_what_an_effect_would_explain_is_not_apart(monkeypatch: pytest.MonkeyPat
     assert stretches_apart([hidden_dive(turning, duration=250.0)]) == []
 
 
-def test_short_and_long_recordings_several_and_alarms_are_taken_whole(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_short_recordings_several_and_alarms_are_taken_whole() -> None:
     dive = hidden_dive(turning, duration=250.0)
     assert stretches_apart([dive.between(0.0, 150.0)]) == []
     assert stretches_apart([dive, replace(dive, name="other.csv")]) == []
     assert stretches_apart([replace(dive, alarms=(BEGINS,))]) == []
+
+
+def test_of_a_long_recording_some_pieces_teach_and_all_are_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    dive = hidden_dive(turning, duration=500.0)
+    taught: list[int] = []
+    fitted = apart._best_of_all
     monkeypatch.setattr(apart, "MOST_ROWS", dive.time.size - 1)
-    assert stretches_apart([dive]) == []
+    monkeypatch.setattr(apart, "SPREAD", dive.time.size // 2)
+    monkeypatch.setattr(
+        apart, "_best_of_all", lambda fitter: taught.append(len(fitter.recordings)) or fitted(fitter)
+    )
+    ((start, end),) = stretches_apart([dive])
+    assert taught[0] == 10
+    assert BEGINS - apart.PIECE < start < BEGINS + 2.0
+    assert ENDS - 2.0 < end < ENDS + 1.5 * apart.PIECE
+
+
+@pytest.mark.parametrize(
+    ("spans", "is_for_good"),
+    [
+        ([(0.0, 50.0), (225.0, 250.0)], False),
+        ([(0.0, 25.0), (200.0, 250.0)], True),
+        ([(225.0, 250.0)], True),
+        ([(200.0, 225.0)], False),
+    ],
+)
+def test_what_lasts_until_the_end_is_for_good_unless_as_much_came_before(
+    spans: list[tuple[float, float]], is_for_good: bool
+) -> None:
+    assert apart._is_for_good(spans, hidden_dive(duration=250.0)) == is_for_good
+
+
+@pytest.mark.long
+def test_a_turn_at_the_end_is_apart_if_there_was_one_before() -> None:
+    def often(time: float, x: Array, plane: float) -> tuple[float, float, float]:
+        return turning(100.0 + time % 150.0 - 75.0, x, plane)
+
+    def at_last(time: float, x: Array, plane: float) -> tuple[float, float, float]:
+        return turning(100.0 + time - 225.0, x, plane)
+
+    _, (start, end) = stretches_apart([hidden_dive(often, duration=250.0)])
+    assert 225.0 - apart.PIECE < start < 230.0
+    assert end == pytest.approx(250.0)
+    assert stretches_apart([hidden_dive(at_last, duration=250.0)]) == []
 
 
 def test_what_is_apart_is_left_out_and_told(monkeypatch: pytest.MonkeyPatch) -> None:

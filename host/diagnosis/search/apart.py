@@ -17,32 +17,36 @@ from host.diagnosis.fits.margins import LITTLE
 from host.diagnosis.fits.prospects import form_gains, gain
 from host.diagnosis.recordings.spans import is_measured, pieces_of
 from host.diagnosis.search.outset import IN_TIME, ends_of, names_of_all, says_all
+from host.likelihood.output_error import output_error
 from host.recordings.left_out import Span
 from host.recordings.recording import Array, Recording
 
 PIECE, LEAST_ROWS = 25.0, 100  # s and rows of a piece, at least
-LEAST_PIECES, MOST_ROWS = 8, 12_000  # what is longer takes minutes
+LEAST_PIECES = 8
+MOST_ROWS, SPREAD = 12_000, 6000  # rows that are fitted at once, which takes minutes; of more so many, spread
 MOST = 0.35  # of all pieces, that may be apart
 WORSE = 1.35  # times what the median piece leaves, and the noise floor: four deviations of 250 rows
 AT_ONCE = 0.4  # of what the worst leaves: what is less bad may only be bent by that
 MOST_ROUNDS = 6
+MOST_STEPS = 10  # to the state with which a piece begins, all else held
 SHARE = 0.5  # of what leaving out does, that no effect promises to do
 
 
 def stretches_apart(recordings: list[Recording]) -> list[Span]:
     """The stretches, s, of one recording without which all that every vehicle has leaves white noise.
 
-    None where they are many, or last until the end: what changed and never comes back is in the catalogue.
+    None where they are many. What lasts until the end is one of them if something before lasted as long: what
+    changed and never comes back is in the catalogue. Of a long recording some pieces teach what every vehicle
+    has, and the others are held against that.
     """
     cut = [piece for one in recordings for piece in pieces_of(one, max(LEAST_ROWS, round(PIECE / one.step)))]
     pieces = [piece for piece in cut if is_measured(piece)]
     names = {recording.name for recording in recordings}
-    rows = sum(recording.time.size for recording in recordings)
-    if len(pieces) < LEAST_PIECES or rows > MOST_ROWS or len(names) > 1:
+    if len(pieces) < LEAST_PIECES or len(names) > 1:
         return []
     if any(recording.alarms for recording in recordings):
         return []
-    kept = pieces
+    kept = teaching = _spread(pieces)
     for number in range(MOST_ROUNDS):
         fitter = Fitter(kept)
         whole = _best_of_all(fitter)
@@ -53,16 +57,43 @@ def stretches_apart(recordings: list[Recording]) -> list[Span]:
         if not is_apart.any():
             break
         kept = [piece for piece, apart in zip(kept, is_apart, strict=True) if not apart]
-        if len(kept) < (1.0 - MOST) * len(pieces):
+        if len(kept) < (1.0 - MOST) * len(teaching):
             return []
     if is_apart.any() or not (says_all(fitter, whole) or fitter.excess(whole.fit) < LITTLE):
         return []
+    if teaching is not pieces:
+        kept = _followed(pieces, whole)
     starts = {piece.time[0] for piece in kept}
-    if len(kept) == len(pieces) or pieces[-1].time[0] not in starts:
+    apart = _joined([piece for piece in pieces if piece.time[0] not in starts])
+    if not apart or len(kept) < (1.0 - MOST) * len(pieces) or _is_for_good(apart, pieces[-1]):
         return []
-    if _share_of_an_effect(*all_of_them, whole) > SHARE:
-        return []
-    return _joined([piece for piece in pieces if piece.time[0] not in starts])
+    return apart if _share_of_an_effect(*all_of_them, whole) < SHARE else []
+
+
+def _spread(pieces: list[Recording]) -> list[Recording]:
+    """Some of many pieces, evenly spaced: they are as good as all, and take less time."""
+    rows = sum(piece.time.size for piece in pieces)
+    if rows <= MOST_ROWS:
+        return pieces
+    few = np.linspace(0, len(pieces) - 1, max(LEAST_PIECES, len(pieces) * SPREAD // rows))
+    return [pieces[k] for k in np.unique(np.rint(few).astype(int))]
+
+
+def _followed(pieces: list[Recording], whole: Explanation) -> list[Recording]:
+    """Those which all that every vehicle has follows as well as most, with the coefficients of others."""
+    fitter = Fitter(pieces, known=whole)
+    start, inputs = fitter.carried_over(whole), fitter.inputs(whole.names)
+    fit = output_error(start, inputs, np.zeros(start.parameters.size, dtype=bool), MOST_STEPS)
+    left = _left(fitter, fitter.explained(whole.names, fit))
+    most = WORSE * max(float(np.median(left)), 1.0)
+    return [piece for piece, each in zip(pieces, left, strict=True) if each <= most]
+
+
+def _is_for_good(apart: list[Span], last: Recording) -> bool:
+    """Whether the last of these stretches lasts until the end, and longer than any before it."""
+    *earlier, (start, end) = apart
+    lasts = end > last.time[-1]
+    return lasts and all(end - start > until - since + last.step for since, until in earlier)
 
 
 def _best_of_all(fitter: Fitter) -> Explanation:
