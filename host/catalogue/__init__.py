@@ -21,20 +21,23 @@ from host.catalogue import (
 )
 from host.dynamics.equations import Effect, Structure
 
-CATALOGUE: tuple[Effect, ...] = (
+NEAR_THE_SURFACE = environment.NEAR_THE_SURFACE
+_IN_ORDER: tuple[Effect, ...] = (
     *environment.EFFECTS,  # first: the speed through the water may depend on how that moves
     *surge.EFFECTS,
     *flow.EFFECTS,
     *heave.EFFECTS,
+    *NEAR_THE_SURFACE,
     *pitch.EFFECTS,
     *heave.BY_TURNING,  # by all that turns the hull
     *kinematics.EFFECTS,
     *actuator.EFFECTS,
     *sensor.EFFECTS,
 )
+CATALOGUE = tuple(effect for effect in _IN_ORDER if effect not in NEAR_THE_SURFACE)
 CHANGES = changes.EFFECTS
 """Entries that are tried only after an alarm, or where a change shows."""
-BY_NAME = {effect.name: effect for effect in (*CHANGES, *CATALOGUE)}  # what changes a speed, before its loss
+BY_NAME = {effect.name: effect for effect in (*CHANGES, *_IN_ORDER)}  # what changes a speed, before its loss
 UNKNOWN = {effect.name: effect for effect in unknown.FORMS}
 _TOOLS = (
     nuisance.FREE_TRIM,

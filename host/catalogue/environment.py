@@ -23,6 +23,12 @@ def _surface_waves(c: Chain) -> None:
     c.climb += oscillation(c, "wave") * ca.exp(-number * c.zeta)
 
 
+def _suction(c: Chain) -> None:
+    near = c.speed_ratio**2 * ca.exp(-ca.fmax(c.zeta, 0) / c.p["suction_reach"])
+    c.heave -= c.p["suction"] * near
+    c.pitch += c.p["suction_moment"] * near
+
+
 def _over_ground(c: Chain) -> None:
     c.speed = c.speed + c.p["ground_share"] * c.climb * ca.sin(c.theta) * c.is_speed_known
 
@@ -79,3 +85,31 @@ EFFECTS = (
         changes=("current_change", "vertical_current", "internal_wave"),
     ),
 )
+NEAR_THE_SURFACE = (
+    Effect(
+        name="free_surface_suction",
+        slot="environment",
+        parameters=(
+            Parameter(
+                name="suction", unit="m/s^2", lower=0, upper=20, meaning="lift at depth zero", speed_power=2
+            ),
+            Parameter(
+                name="suction_moment",
+                unit="rad/s^2",
+                lower=-20,
+                upper=20,
+                meaning="its moment",
+                speed_power=2,
+            ),
+            Parameter(name="suction_reach", unit="m", lower=0.2, upper=5, meaning="e-folding depth"),
+        ),
+        sentence="Near the surface the hull is sucked up towards it, and turned.",
+        equation="w' = ... - suction (u/u0)^2 exp(-zeta/suction_reach), "
+        "q' = ... + suction_moment (u/u0)^2 exp(-zeta/suction_reach)",
+        manoeuvre="level runs at one, two and four hull diameters below the surface",
+        probes=((0.0, 0.0, 0.7), (0.0, 0.0, 2.0)),
+        sizes=("suction", "suction_moment"),
+        force=_suction,
+    ),
+)
+"""Entries that are tried only of a vehicle that comes near the surface."""

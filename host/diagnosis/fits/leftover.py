@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.stats import chi2
 
 from host.catalogue.unknown import ANY_SMOOTH_FORCE
-from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.explanation import COLOUR, Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.prospects import gain
 from host.diagnosis.fits.speed_forces import are_by_speed
@@ -20,7 +20,6 @@ from host.recordings.recording import Array, Recording
 
 SIGNIFICANCE = 1e-4
 SEA_DOUBT = 1.5  # no sea is as white and steady as the filter takes it to be
-COLOUR = 0.05  # autocorrelation that the shape of a spectrum leaves: no sea has one peak of second order
 GROUPS, LEAST_IN_GROUP = 10, 5
 LEAST_SEA = 0.003  # m/s; below it physics left out, not moving water, is what passes for noise
 MOVEMENT_SPAN = 0.5  # s

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from host.catalogue import CATALOGUE, CHANGES, named, structure_of
+from host.catalogue import CATALOGUE, CHANGES, NEAR_THE_SURFACE, named, structure_of
 from host.catalogue.moments import FIRST, LAST
 from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE, SPEED_CORRECTION, has_memory
 from host.catalogue.unknown import SPANS
@@ -29,6 +29,7 @@ from host.recordings.rounding import NO_STEPS, thinned
 
 ALARM_EARLY = 30.0  # s, by which a moment that somebody names may lie before the change
 SLIGHT = 2e-3  # of the variance of all force: 4 % of it, about as much as any model is off
+SHALLOW = 4.0  # m; the surface pulls at a hull within a few of its diameters
 SURGE = {"speed_time": 10.0, "c_ud": 0.0, "c_uq": 0.0}
 """Coefficients of the surge equation, and what they are where nothing tells them."""
 
@@ -69,6 +70,8 @@ class Setting:
         self.held[FIRST] = min(float(r.time[0]) for r in recordings)
         self.held[LAST] = max(float(r.time[-1]) for r in recordings)
         self.candidates: tuple[Effect, ...] = CATALOGUE
+        if np.nanmin(np.concatenate([recording.depth for recording in recordings])) < SHALLOW:
+            self.candidates += NEAR_THE_SURFACE
         alarms = [alarm for recording in recordings for alarm in recording.alarms]
         if alarms:
             self.candidates += CHANGES
