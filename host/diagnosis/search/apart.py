@@ -6,7 +6,9 @@ Over short pieces, each with a start of its own, all that every vehicle has expl
 left out until it does (least trimmed squares: Rousseeuw, J. Am. Stat. Assoc. 79, 1984).
 """
 
+from dataclasses import replace
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,10 +28,24 @@ LEAST_PIECES = 8
 MOST_ROWS, SPREAD = 12_000, 6000  # rows that are fitted at once, which takes minutes; of more so many, spread
 MOST = 0.35  # of all pieces, that may be apart
 WORSE = 1.35  # times what the median piece leaves, and the noise floor: four deviations of 250 rows
+NOT_TAUGHT = 1.7  # the same of pieces that did not teach: turns leave tens
 AT_ONCE = 0.4  # of what the worst leaves: what is less bad may only be bent by that
 MOST_ROUNDS = 6
+BENT = 10.0  # times the noise floor: more is no small error of the coefficients
 MOST_STEPS = 10  # to the state with which a piece begins, all else held
 SHARE = 0.5  # of what leaving out does, that no effect promises to do
+
+
+class _Taught(NamedTuple):
+    """Pieces and all that every vehicle has, fitted to them; and as it was before the worst were left out."""
+
+    pieces: list[Recording]
+    whole: Explanation
+    at_first: tuple[Fitter, Explanation]
+
+    def is_spread(self, pieces: list[Recording]) -> bool:
+        """Whether others than these were never fitted."""
+        return len(self.at_first[0].recordings) < len(pieces)
 
 
 def stretches_apart(recordings: list[Recording]) -> list[Span]:
@@ -46,28 +62,14 @@ def stretches_apart(recordings: list[Recording]) -> list[Span]:
         return []
     if any(recording.alarms for recording in recordings):
         return []
-    kept = teaching = _spread(pieces)
-    for number in range(MOST_ROUNDS):
-        fitter = Fitter(kept)
-        whole = _best_of_all(fitter)
-        if number == 0:
-            all_of_them = fitter, whole
-        left = _left(fitter, whole)
-        is_apart = left > max(WORSE * max(float(np.median(left)), 1.0), AT_ONCE * float(left.max()))
-        if not is_apart.any():
-            break
-        kept = [piece for piece, apart in zip(kept, is_apart, strict=True) if not apart]
-        if len(kept) < (1.0 - MOST) * len(teaching):
-            return []
-    if is_apart.any() or not (says_all(fitter, whole) or fitter.excess(whole.fit) < LITTLE):
+    if (taught := _taught_by(_spread(pieces))) is None:
         return []
-    if teaching is not pieces:
-        kept = _followed(pieces, whole)
+    kept = _followed(pieces, taught) if taught.is_spread(pieces) else taught.pieces
     starts = {piece.time[0] for piece in kept}
     apart = _joined([piece for piece in pieces if piece.time[0] not in starts])
     if not apart or len(kept) < (1.0 - MOST) * len(pieces) or _is_for_good(apart, pieces[-1]):
         return []
-    return apart if _share_of_an_effect(*all_of_them, whole) < SHARE else []
+    return apart if _share_of_an_effect(*taught.at_first, taught.whole) < SHARE else []
 
 
 def _spread(pieces: list[Recording]) -> list[Recording]:
@@ -79,14 +81,56 @@ def _spread(pieces: list[Recording]) -> list[Recording]:
     return [pieces[k] for k in np.unique(np.rint(few).astype(int))]
 
 
-def _followed(pieces: list[Recording], whole: Explanation) -> list[Recording]:
-    """Those which all that every vehicle has follows as well as most, with the coefficients of others."""
-    fitter = Fitter(pieces, known=whole)
-    start, inputs = fitter.carried_over(whole), fitter.inputs(whole.names)
-    fit = output_error(start, inputs, np.zeros(start.parameters.size, dtype=bool), MOST_STEPS)
-    left = _left(fitter, fitter.explained(whole.names, fit))
-    most = WORSE * max(float(np.median(left)), 1.0)
+def _taught_by(pieces: list[Recording]) -> _Taught | None:
+    """What these pieces teach without the worst of them; None where too many would have to go."""
+    kept = pieces
+    for number in range(MOST_ROUNDS):
+        fitter = Fitter(kept)
+        whole = _best_of_all(fitter)
+        if number == 0:
+            at_first = fitter, whole
+        left = _left(fitter, whole)
+        is_apart = left > max(_most(left), AT_ONCE * float(left.max()))
+        if not is_apart.any():
+            break
+        kept = [piece for piece, apart in zip(kept, is_apart, strict=True) if not apart]
+        if len(kept) < (1.0 - MOST) * len(pieces):
+            return None
+    is_told = says_all(fitter, whole) or fitter.excess(whole.fit) < LITTLE
+    return _Taught(kept, whole, at_first) if is_told and not is_apart.any() else None
+
+
+def _followed(pieces: list[Recording], taught: _Taught) -> list[Recording]:
+    """The pieces that others explain as well as themselves; none where what is doubted would not be taught.
+
+    A few may not have shown all that the hull does, so what they leave a little of teaches as well.
+    """
+    left = _left_by(pieces, taught.whole)
+    is_doubted = (left > _most(left)) & (left < BENT)
+    doubted = [piece for piece, doubt in zip(pieces, is_doubted, strict=True) if doubt]
+    few = np.linspace(0, len(doubted) - 1, min(len(doubted), len(taught.pieces)))
+    more = {piece.time[0]: piece for piece in [*taught.pieces, *(doubted[round(k)] for k in few)]}
+    again = _taught_by([more[time] for time in sorted(more)])
+    if again is None:
+        return []
+    left = _left_by(pieces, again.whole)
+    most = NOT_TAUGHT * max(float(np.median(left)), 1.0)
     return [piece for piece, each in zip(pieces, left, strict=True) if each <= most]
+
+
+def _left_by(pieces: list[Recording], whole: Explanation) -> Array:
+    """What the coefficients that others taught leave of each piece."""
+    fitter = Fitter(pieces, known=whole)
+    # At their speed, to which the coefficients belong, not at the mean of all pieces.
+    start = replace(fitter.carried_over(whole), parameters=whole.fit.parameters)
+    held = np.zeros(start.parameters.size, dtype=bool)
+    fit = output_error(start, fitter.inputs(whole.names), held, MOST_STEPS)
+    return _left(fitter, fitter.explained(whole.names, fit))
+
+
+def _most(left: Array) -> float:
+    """What a piece may leave."""
+    return WORSE * max(float(np.median(left)), 1.0)
 
 
 def _is_for_good(apart: list[Span], last: Recording) -> bool:
