@@ -52,7 +52,7 @@ def test_a_sensor_that_was_silent_for_a_while_is_no_stretch_apart() -> None:
 
 
 def test_what_an_effect_would_explain_is_not_apart(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(apart, "gain", lambda *_, **__: 1e9)
+    monkeypatch.setattr(apart, "_less", lambda *_: 1.0)
     assert stretches_apart([hidden_dive(turning, duration=250.0)]) == []
 
 

@@ -7,16 +7,16 @@ left out until it does (least trimmed squares: Rousseeuw, J. Am. Stat. Assoc. 79
 """
 
 from dataclasses import replace
-from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
+from host.catalogue.kin import OFFSETS
 from host.catalogue.moments import SCANS
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LITTLE
-from host.diagnosis.fits.prospects import form_gains, gain
+from host.diagnosis.fits.prospects import form_gains
 from host.diagnosis.recordings.spans import is_measured, pieces_of
 from host.diagnosis.search.outset import IN_TIME, ends_of, names_of_all, says_all
 from host.likelihood.output_error import output_error
@@ -33,7 +33,7 @@ AT_ONCE = 0.4  # of what the worst leaves: what is less bad may only be bent by 
 MOST_ROUNDS = 6
 BENT = 10.0  # times the noise floor: more is no small error of the coefficients
 MOST_STEPS = 10  # to the state with which a piece begins, all else held
-SHARE = 0.5  # of what leaving out does, that no effect promises to do
+SHARE = 0.5  # of what leaving out does, that no effect does
 
 
 class _Taught(NamedTuple):
@@ -69,7 +69,7 @@ def stretches_apart(recordings: list[Recording]) -> list[Span]:
     apart = _joined([piece for piece in pieces if piece.time[0] not in starts])
     if not apart or len(kept) < (1.0 - MOST) * len(pieces) or _is_for_good(apart, pieces[-1]):
         return []
-    return apart if _share_of_an_effect(*taught.at_first, taught.whole) < SHARE else []
+    return [] if _does_an_effect_as_much(*taught.at_first, taught.whole) else apart
 
 
 def _spread(pieces: list[Recording]) -> list[Recording]:
@@ -150,20 +150,27 @@ def _best_of_all(fitter: Fitter) -> Explanation:
     return best
 
 
-def _share_of_an_effect(fitter: Fitter, bent: Explanation, freed: Explanation) -> float:
-    """How much of what leaving out did an effect, or a form of unknown physics, promises to do on all pieces.
+def _does_an_effect_as_much(fitter: Fitter, bent: Explanation, freed: Explanation) -> bool:
+    """Whether an effect does much of what leaving out did, or a form of unknown physics promises to.
 
-    What acts only far over, or fast, is as local in time as a turn. What goes with time alone is not asked.
+    What acts only far over, or fast, or deep, is as local in time as a turn. What goes with time alone is not
+    asked.
 
     bent, freed  all that every vehicle has, on all pieces and on those that are left
     """
-    beside = {*IN_TIME, *SCANS, *bent.names}
+    beside = {*IN_TIME, *SCANS, *OFFSETS, *bent.names}
     names = [one.name for one in fitter.candidates if one.name not in beside and not one.changes]
-    gains = [gain(fitter, bent, name, [], is_thorough=True) for name in names]
-    gains += [one for name, one in form_gains(fitter, bent).items() if name not in beside]
     rows = sum(np.isfinite(e).sum(axis=1) for e in bent.fit.whitened)
-    possible = float(np.sum(rows * (1.0 - freed.fit.noise[:2] / bent.fit.noise[:2])))
-    return max(gains) / possible if possible > 0.0 else inf
+    least = SHARE * _less(rows, bent, freed)
+    forms = form_gains(fitter, bent)
+    if max(worth for name, worth in forms.items() if name not in beside) > least:
+        return True
+    return any(_less(rows, bent, fitter.grown(bent, name, [])) > least for name in names)
+
+
+def _less(rows: Array, bent: Explanation, other: Explanation) -> float:
+    """By how much the squared errors of rows (2,) over their variance are less."""
+    return float(np.sum(rows * (1.0 - other.fit.noise[:2] / bent.fit.noise[:2])))
 
 
 def _left(fitter: Fitter, whole: Explanation) -> Array:
