@@ -21,6 +21,7 @@ from host.diagnosis.search.outset import (
     says_all,
 )
 from host.diagnosis.search.search import Search
+from host.diagnosis.search.short_runs import ShortRuns, followed_shortly, short_runs
 from host.diagnosis.search.whole_vehicle import is_real, with_all_ordinary
 from host.recordings.left_out import Span, without
 from host.recordings.plane_between_rows import ways_between
@@ -86,9 +87,13 @@ def likelier_first(
         return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
     if may_leave_out and whole is not None and leading.fitter.excess(whole.fit) > MUCH:
         on_progress("stretches of other physics")
-        if apart := stretches_apart(leading.recordings):
+        short = short_runs(leading.recordings)
+        if short is not None and (apart := stretches_apart(short)):
             rest = likelier_first(ways(without(leading.recordings, apart, APART)), on_progress, jobs)
             return [way._replace(apart=tuple(apart)) for way in rest]
+        followed = _led_by_short_runs([leading, *others], whole, short, on_progress, jobs)
+        if followed:
+            return followed
     if whole is not None:
         whole = beside_what_leads(leading.fitter, whole, jobs)
     if seen := _among_waves(found):
@@ -132,6 +137,25 @@ def _in_a_swell(seen: list[Way], whole: Explanation | None) -> list[Way]:
     if swell is None:
         return begun
     return [way._replace(swell=own) for way, own in _as_seen_by(begun, swell)]
+
+
+def _led_by_short_runs(
+    found: list[Way],
+    whole: Explanation,
+    short: ShortRuns | None,
+    on_progress: Callable[[str], None],
+    jobs: int,
+) -> list[Way]:
+    """The ways as short runs and slight forces see them, where these explain what no long run follows."""
+    fitter = found[0].fitter
+    if short is None:
+        return []
+    with Workers(fitter, jobs) as workers:
+        search = Search(fitter, workers, on_progress, fitter.base, fitter.root)
+        pushed = followed_shortly(search, whole, short)
+    if pushed is None:
+        return []
+    return [way._replace(pushed=own, calm=whole) for way, own in _as_seen_by(found, pushed)]
 
 
 def _pushed_about(

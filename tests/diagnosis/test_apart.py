@@ -13,8 +13,11 @@ from host.diagnosis import plane_choice
 from host.diagnosis.diagnose import _apart, _with_apart
 from host.diagnosis.plane_choice import Way, likelier_first
 from host.diagnosis.search import apart
+from host.diagnosis.search import short_runs as pieces
 from host.diagnosis.search.apart import stretches_apart
-from host.recordings.recording import Array
+from host.diagnosis.search.short_runs import short_runs
+from host.recordings.left_out import Span
+from host.recordings.recording import Array, Recording
 
 BEGINS, ENDS = 100.0, 140.0  # s
 
@@ -32,50 +35,55 @@ def everywhere(time: float, x: Array, plane: float) -> tuple[float, float, float
     return 0.0, 1.5 * np.sin(time), 0.0
 
 
+def spans_of(recordings: list[Recording]) -> list[Span]:
+    short = short_runs(recordings)
+    return [] if short is None else stretches_apart(short)
+
+
 @pytest.mark.parametrize(
     ("extra", "is_apart"), [(turning, True), (lightened, False), (everywhere, False), (nothing, False)]
 )
 def test_a_turn_is_apart_and_what_stays_is_not(extra: Extra, is_apart: bool) -> None:
-    spans = stretches_apart([hidden_dive(extra, duration=250.0)])
+    spans = spans_of([hidden_dive(extra, duration=250.0)])
     assert bool(spans) == is_apart
     if is_apart:
         ((start, end),) = spans
-        assert BEGINS - apart.PIECE < start < BEGINS + 2.0
-        assert ENDS - 2.0 < end < ENDS + 1.5 * apart.PIECE
+        assert BEGINS - pieces.PIECE < start < BEGINS + 2.0
+        assert ENDS - 2.0 < end < ENDS + 1.5 * pieces.PIECE
 
 
 def test_a_sensor_that_was_silent_for_a_while_is_no_stretch_apart() -> None:
     dive = hidden_dive(turning, duration=250.0)
     dive.pitch[300:600], dive.depth[:20] = np.nan, np.nan
-    ((start, end),) = stretches_apart([dive])
-    assert BEGINS - apart.PIECE < start < end < ENDS + 1.5 * apart.PIECE
+    ((start, end),) = spans_of([dive])
+    assert BEGINS - pieces.PIECE < start < end < ENDS + 1.5 * pieces.PIECE
 
 
 def test_what_an_effect_would_explain_is_not_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(apart, "_less", lambda *_: 1.0)
-    assert stretches_apart([hidden_dive(turning, duration=250.0)]) == []
+    assert spans_of([hidden_dive(turning, duration=250.0)]) == []
 
 
 def test_short_recordings_several_and_alarms_are_taken_whole() -> None:
     dive = hidden_dive(turning, duration=250.0)
-    assert stretches_apart([dive.between(0.0, 150.0)]) == []
-    assert stretches_apart([dive, replace(dive, name="other.csv")]) == []
-    assert stretches_apart([replace(dive, alarms=(BEGINS,))]) == []
+    assert spans_of([dive.between(0.0, 150.0)]) == []
+    assert spans_of([dive, replace(dive, name="other.csv")]) == []
+    assert spans_of([replace(dive, alarms=(BEGINS,))]) == []
 
 
 def test_of_a_long_recording_some_pieces_teach_and_all_are_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     dive = hidden_dive(turning, duration=500.0)
     taught: list[int] = []
-    fitted = apart._best_of_all
-    monkeypatch.setattr(apart, "MOST_ROWS", dive.time.size - 1)
-    monkeypatch.setattr(apart, "SPREAD", dive.time.size // 2)
+    fitted = pieces.best_of_all
+    monkeypatch.setattr(pieces, "MOST_ROWS", dive.time.size - 1)
+    monkeypatch.setattr(pieces, "SPREAD", dive.time.size // 2)
     monkeypatch.setattr(
-        apart, "_best_of_all", lambda fitter: taught.append(len(fitter.recordings)) or fitted(fitter)
+        pieces, "best_of_all", lambda fitter: taught.append(len(fitter.recordings)) or fitted(fitter)
     )
-    ((start, end),) = stretches_apart([dive])
+    ((start, end),) = spans_of([dive])
     assert taught[0] == 10
-    assert BEGINS - apart.PIECE < start < BEGINS + 2.0
-    assert ENDS - 2.0 < end < ENDS + 1.5 * apart.PIECE
+    assert BEGINS - pieces.PIECE < start < BEGINS + 2.0
+    assert ENDS - 2.0 < end < ENDS + 1.5 * pieces.PIECE
 
 
 @pytest.mark.parametrize(
@@ -101,10 +109,10 @@ def test_a_turn_at_the_end_is_apart_if_there_was_one_before() -> None:
     def at_last(time: float, x: Array, plane: float) -> tuple[float, float, float]:
         return turning(100.0 + time - 225.0, x, plane)
 
-    _, (start, end) = stretches_apart([hidden_dive(often, duration=250.0)])
-    assert 225.0 - apart.PIECE < start < 230.0
+    _, (start, end) = spans_of([hidden_dive(often, duration=250.0)])
+    assert 225.0 - pieces.PIECE < start < 230.0
     assert end == pytest.approx(250.0)
-    assert stretches_apart([hidden_dive(at_last, duration=250.0)]) == []
+    assert spans_of([hidden_dive(at_last, duration=250.0)]) == []
 
 
 def test_what_is_apart_is_left_out_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -118,6 +126,7 @@ def test_what_is_apart_is_left_out_and_told(monkeypatch: pytest.MonkeyPatch) -> 
         return [Way(recordings, fitter)]
 
     monkeypatch.setattr(plane_choice, "ways", begun)
+    monkeypatch.setattr(plane_choice, "short_runs", lambda _: rest)
     monkeypatch.setattr(plane_choice, "stretches_apart", lambda _: [(BEGINS, ENDS)])
     monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: None if rest else whole)
     monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)

@@ -9,17 +9,22 @@ from scipy.integrate import solve_ivp
 
 from host.catalogue import CATALOGUE, NEAR_THE_SURFACE, structure_of
 from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.margins import MUCH
 from host.diagnosis.fits.setting import SHALLOW
+from host.diagnosis.fits.workers import Workers
 from host.diagnosis.recordings.spans import pieces_of
+from host.diagnosis.search.outset import at_the_outset
+from host.diagnosis.search.search import Search
+from host.diagnosis.search.short_runs import followed_shortly, short_runs
 from host.likelihood.gauss_newton import Point
 from host.recordings.recording import Array, Recording
 
 PULL, TURN, REACH = 0.25, 0.8, 1.2  # m/s^2 and rad/s^2 at the surface, m
 
 
-def held_below_the_surface() -> Recording:
+def held_below_the_surface(duration: float = 120.0) -> Recording:
     """Steps between 1.8 and 4 m by a depth autopilot, with doublets on top; integrated by scipy."""
-    plain, rng = hidden_dive(duration=120.0), np.random.default_rng(3)
+    plain, rng = hidden_dive(duration=duration), np.random.default_rng(3)
     x, states = np.array([0.0, 0.0, 0.0, 3.0]), np.empty((4, plain.time.size))
     planes = np.empty(plain.time.size)
     for k, time in enumerate(plain.time):
@@ -67,3 +72,22 @@ def test_its_pull_its_moment_and_its_reach_are_told_by_the_motion() -> None:
     assert values["suction"] == pytest.approx(PULL, rel=0.1)
     assert values["suction_moment"] == pytest.approx(TURN, rel=0.1)
     assert values["suction_reach"] == pytest.approx(REACH, rel=0.1)
+
+
+@pytest.mark.long
+def test_short_runs_teach_what_no_long_one_follows() -> None:
+    dive = held_below_the_surface(duration=250.0)
+    fitter, short = Fitter([dive]), short_runs([dive])
+    whole = at_the_outset(fitter)
+    assert short is not None
+    assert whole is not None
+    assert fitter.excess(whole.fit) > MUCH
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        found = followed_shortly(search, whole, short)
+        assert followed_shortly(search, whole, short._replace(whole=short.fitter.base)) is None
+    assert found is not None
+    values = dict(zip(found.fit.structure.names, found.fit.parameters.tolist(), strict=True))
+    assert found.bic < whole.bic
+    assert values["suction"] == pytest.approx(PULL, rel=0.2)
+    assert values["suction_reach"] == pytest.approx(REACH, rel=0.2)

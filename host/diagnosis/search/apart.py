@@ -17,15 +17,12 @@ from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LITTLE
 from host.diagnosis.fits.prospects import form_gains
-from host.diagnosis.recordings.spans import is_measured, pieces_of
-from host.diagnosis.search.outset import IN_TIME, ends_of, names_of_all, says_all
+from host.diagnosis.search.outset import IN_TIME, says_all
+from host.diagnosis.search.short_runs import ShortRuns, best_of_all
 from host.likelihood.output_error import output_error
 from host.recordings.left_out import Span
 from host.recordings.recording import Array, Recording
 
-PIECE, LEAST_ROWS = 25.0, 100  # s and rows of a piece, at least
-LEAST_PIECES = 8
-MOST_ROWS, SPREAD = 12_000, 6000  # rows that are fitted at once, which takes minutes; of more so many, spread
 MOST = 0.35  # of all pieces, that may be apart
 WORSE = 1.35  # times what the median piece leaves, and the noise floor: four deviations of 250 rows
 NOT_TAUGHT = 1.7  # the same of pieces that did not teach: turns leave tens
@@ -37,67 +34,48 @@ SHARE = 0.5  # of what leaving out does, that no effect does
 
 
 class _Taught(NamedTuple):
-    """Pieces and all that every vehicle has, fitted to them; and as it was before the worst were left out."""
+    """Pieces without the worst, and all that every vehicle has, fitted to them."""
 
     pieces: list[Recording]
     whole: Explanation
-    at_first: tuple[Fitter, Explanation]
-
-    def is_spread(self, pieces: list[Recording]) -> bool:
-        """Whether others than these were never fitted."""
-        return len(self.at_first[0].recordings) < len(pieces)
 
 
-def stretches_apart(recordings: list[Recording]) -> list[Span]:
+def stretches_apart(short: ShortRuns) -> list[Span]:
     """The stretches, s, of one recording without which all that every vehicle has leaves white noise.
 
     None where they are many. What lasts until the end is one of them if something before lasted as long: what
     changed and never comes back is in the catalogue. Of a long recording some pieces teach what every vehicle
     has, and the others are held against that.
     """
-    cut = [piece for one in recordings for piece in pieces_of(one, max(LEAST_ROWS, round(PIECE / one.step)))]
-    pieces = [piece for piece in cut if is_measured(piece)]
-    names = {recording.name for recording in recordings}
-    if len(pieces) < LEAST_PIECES or len(names) > 1:
+    pieces = short.pieces
+    if (taught := _without_the_worst(short.fitter, short.whole)) is None:
         return []
-    if any(recording.alarms for recording in recordings):
-        return []
-    if (taught := _taught_by(_spread(pieces))) is None:
-        return []
-    kept = _followed(pieces, taught) if taught.is_spread(pieces) else taught.pieces
+    kept = taught.pieces if short.are_all_fitted else _followed(pieces, taught)
     starts = {piece.time[0] for piece in kept}
     apart = _joined([piece for piece in pieces if piece.time[0] not in starts])
     if not apart or len(kept) < (1.0 - MOST) * len(pieces) or _is_for_good(apart, pieces[-1]):
         return []
-    return [] if _does_an_effect_as_much(*taught.at_first, taught.whole) else apart
+    return [] if _does_an_effect_as_much(short.fitter, short.whole, taught.whole) else apart
 
 
-def _spread(pieces: list[Recording]) -> list[Recording]:
-    """Some of many pieces, evenly spaced: they are as good as all, and take less time."""
-    rows = sum(piece.time.size for piece in pieces)
-    if rows <= MOST_ROWS:
-        return pieces
-    few = np.linspace(0, len(pieces) - 1, max(LEAST_PIECES, len(pieces) * SPREAD // rows))
-    return [pieces[k] for k in np.unique(np.rint(few).astype(int))]
+def _without_the_worst(fitter: Fitter, whole: Explanation) -> _Taught | None:
+    """The pieces, refitted without those of which most is left; None where too many would have to go.
 
-
-def _taught_by(pieces: list[Recording]) -> _Taught | None:
-    """What these pieces teach without the worst of them; None where too many would have to go."""
-    kept = pieces
-    for number in range(MOST_ROUNDS):
-        fitter = Fitter(kept)
-        whole = _best_of_all(fitter)
-        if number == 0:
-            at_first = fitter, whole
+    whole  all that every vehicle has, fitted to all of them
+    """
+    pieces = kept = fitter.recordings
+    for _ in range(MOST_ROUNDS):
         left = _left(fitter, whole)
         is_apart = left > max(_most(left), AT_ONCE * float(left.max()))
         if not is_apart.any():
-            break
+            is_told = says_all(fitter, whole) or fitter.excess(whole.fit) < LITTLE
+            return _Taught(kept, whole) if is_told else None
         kept = [piece for piece, apart in zip(kept, is_apart, strict=True) if not apart]
         if len(kept) < (1.0 - MOST) * len(pieces):
             return None
-    is_told = says_all(fitter, whole) or fitter.excess(whole.fit) < LITTLE
-    return _Taught(kept, whole, at_first) if is_told and not is_apart.any() else None
+        fitter = Fitter(kept)
+        whole = best_of_all(fitter)
+    return None
 
 
 def _followed(pieces: list[Recording], taught: _Taught) -> list[Recording]:
@@ -110,7 +88,8 @@ def _followed(pieces: list[Recording], taught: _Taught) -> list[Recording]:
     doubted = [piece for piece, doubt in zip(pieces, is_doubted, strict=True) if doubt]
     few = np.linspace(0, len(doubted) - 1, min(len(doubted), len(taught.pieces)))
     more = {piece.time[0]: piece for piece in [*taught.pieces, *(doubted[round(k)] for k in few)]}
-    again = _taught_by([more[time] for time in sorted(more)])
+    fitter = Fitter([more[time] for time in sorted(more)])
+    again = _without_the_worst(fitter, best_of_all(fitter))
     if again is None:
         return []
     left = _left_by(pieces, again.whole)
@@ -138,16 +117,6 @@ def _is_for_good(apart: list[Span], last: Recording) -> bool:
     *earlier, (start, end) = apart
     lasts = end > last.time[-1]
     return lasts and all(end - start > until - since + last.step for since, until in earlier)
-
-
-def _best_of_all(fitter: Fitter) -> Explanation:
-    """The root with all that every vehicle has, from the first start that leaves nothing, or the best."""
-    best = fitter.root
-    for found in ends_of(fitter, names_of_all(fitter)):
-        best = min(best, found, key=lambda e: e.bic)
-        if says_all(fitter, best):
-            break
-    return best
 
 
 def _does_an_effect_as_much(fitter: Fitter, bent: Explanation, freed: Explanation) -> bool:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.catalogue import ALONG_THE_HULL, DRIVE, FAINT, ORDINARY
+from host.catalogue import ALONG_THE_HULL, DRIVE, FAINT, NEAR_THE_SURFACE, ORDINARY
 from host.catalogue.kin import OFFSETS
 from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
@@ -170,9 +170,18 @@ def pushed_by_forces(search: "Search", whole: Explanation) -> Explanation | None
     are_many = (sea.fit.noise[2:] > MOST_FORCES * np.square(fitter.accelerations)).any()
     if are_many or explained < FAR_LIKELIER * sea.fit.samples or are_by_speed(fitter, sea.fit):
         return None
+    return sea if is_enough_beside(search, sea, whole) else None
+
+
+def is_enough_beside(search: "Search", sea: Explanation, whole: Explanation) -> bool:
+    """Whether beside random forces nothing in the catalogue gains, nor any form of unknown physics.
+
+    whole  without forces: of what these explain more than it does, what gains must gain a fair part
+    """
+    fitter = search.fitter
+    explained = as_filtered(fitter, whole).bic - sea.bic
     least = max(margin(sea) + log(sea.fit.samples), FAIR_PART * explained)
-    ahead = max(*search.gains(sea).values(), *form_gains(fitter, sea).values())
-    return sea if ahead < least else None
+    return max(*search.gains(sea).values(), *form_gains(fitter, sea).values()) < least
 
 
 def goes_on_from(search: "Search", joint: Explanation) -> bool:
@@ -216,6 +225,7 @@ def _with_a_form(search: "Search", whole: Explanation) -> Explanation:
 def names_of_all(fitter: Fitter) -> Names:
     """All that every vehicle has beside a free trim, and what that needs on these recordings."""
     names = frozenset({FREE_TRIM.name, *ORDINARY, *FAINT, ALONG_THE_HULL})
+    names |= {effect.name for effect in NEAR_THE_SURFACE if effect in fitter.candidates}
     return names | {*fitter.tools_beside(names)}
 
 
