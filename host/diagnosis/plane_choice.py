@@ -12,7 +12,7 @@ from host.diagnosis.fits.margins import LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN
 from host.diagnosis.fits.sea_fits import as_filtered, with_waves
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.recordings.spans import divide, excerpt
-from host.diagnosis.search.apart import stretches_apart
+from host.diagnosis.search.apart import NOTHING, stretches_apart
 from host.diagnosis.search.outset import (
     at_the_outset,
     beside_what_leads,
@@ -88,9 +88,14 @@ def likelier_first(
     if may_leave_out and whole is not None and leading.fitter.excess(whole.fit) > MUCH:
         on_progress("stretches of other physics")
         short = short_runs(leading.recordings)
-        if short is not None and (apart := stretches_apart(short)):
+        apart, instead = NOTHING if short is None else stretches_apart(short)
+        if apart:
             rest = likelier_first(ways(without(leading.recordings, apart, APART)), on_progress, jobs)
             return [way._replace(apart=tuple(apart)) for way in rest]
+        if instead is not None:
+            whole = min(whole, leading.fitter.refitted(instead), key=lambda e: e.bic)
+            if says_all(leading.fitter, whole):
+                return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
         followed = _led_by_short_runs([leading, *others], whole, short, on_progress, jobs)
         if followed:
             return followed

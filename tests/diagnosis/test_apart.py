@@ -37,7 +37,7 @@ def everywhere(time: float, x: Array, plane: float) -> tuple[float, float, float
 
 def spans_of(recordings: list[Recording]) -> list[Span]:
     short = short_runs(recordings)
-    return [] if short is None else stretches_apart(short)
+    return [] if short is None else stretches_apart(short).spans
 
 
 @pytest.mark.parametrize(
@@ -60,8 +60,12 @@ def test_a_sensor_that_was_silent_for_a_while_is_no_stretch_apart() -> None:
 
 
 def test_what_an_effect_would_explain_is_not_apart(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(apart, "_less", lambda *_: 1.0)
-    assert spans_of([hidden_dive(turning, duration=250.0)]) == []
+    short = short_runs([hidden_dive(turning, duration=250.0)])
+    assert short is not None
+    monkeypatch.setattr(apart, "_with_an_effect", lambda *_: short.whole)
+    assert stretches_apart(short) == ([], short.whole)
+    monkeypatch.setattr(apart, "form_gains", lambda *_: {"unknown_force_w_w": np.inf})
+    assert stretches_apart(short) == ([], None)
 
 
 def test_short_recordings_several_and_alarms_are_taken_whole() -> None:
@@ -127,7 +131,7 @@ def test_what_is_apart_is_left_out_and_told(monkeypatch: pytest.MonkeyPatch) -> 
 
     monkeypatch.setattr(plane_choice, "ways", begun)
     monkeypatch.setattr(plane_choice, "short_runs", lambda _: rest)
-    monkeypatch.setattr(plane_choice, "stretches_apart", lambda _: [(BEGINS, ENDS)])
+    monkeypatch.setattr(plane_choice, "stretches_apart", lambda _: apart.Apart([(BEGINS, ENDS)]))
     monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: None if rest else whole)
     monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)
     (way,) = likelier_first([Way([dive], cast("Any", fitter))], lambda _: None, 1, may_leave_out=True)

@@ -13,6 +13,7 @@ from host.diagnosis.fits.leftover import Leftover
 from host.diagnosis.proof.scoring import Misfit
 from host.diagnosis.proof.slight import is_slight
 from host.diagnosis.proof.verdict import (
+    FAINT_WAVES,
     Verdict,
     beyond_bounds_in,
     beyond_geometry_in,
@@ -257,6 +258,21 @@ def test_a_coefficient_that_would_be_larger_than_on_any_vehicle_is_doubted(
     rough = replace(best, fit=replace(found, noise=noise))
     said = remaining(verdict, rough, leftover(), misfit(40.0))
     assert (f"{doubted} would have to be larger than on any vehicle" in said) == bool(doubted)
+
+
+@pytest.mark.parametrize(
+    ("worth", "verdict"),
+    [
+        (FAINT_WAVES + 1.0, "partly_explained"),
+        (FAINT_WAVES - 1.0, "unexplained"),
+        (np.inf, "unexplained"),
+    ],
+)
+def test_waves_that_explain_much_are_told_though_no_free_run_is_better(
+    base: Explanation, worth: float, verdict: str
+) -> None:
+    said = verdict_on(named(base, "surface_waves"), leftover(is_smooth=True), misfit(9.0), misfit(8.0), worth)
+    assert said == verdict
 
 
 @pytest.mark.parametrize(("evidence", "verdict"), [(16.0, "partly_explained"), (200.0, "explained")])

@@ -1,5 +1,6 @@
 """Fits under random forces and waves, and what is told by these at once."""
 
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -123,6 +124,12 @@ def test_the_search_among_waves_begins_with_all_of_it(
         with monkeypatch.context() as likely:
             likely.setattr(all_at_sea, "with_sea", lambda _, fitted: fitted)
             assert in_a_swell(calm, swell) is None  # where they were as likely, no waves
+        for share, is_enough in ((0.5, True), (2.0, False)):  # of a trace
+            gained = share * all_at_sea.TRACE * told.waves.delta_bic
+            with monkeypatch.context() as smooth:
+                smooth.setattr(all_at_sea, "left_among", lambda *_: replace(told.left, is_smooth=True))
+                smooth.setattr(all_at_sea, "form_gains", lambda *_, gained=gained: {"form": gained})
+                assert (in_a_swell(calm, swell) is not None) == is_enough
         monkeypatch.setattr(Search, "run_from", lambda *_: fitter.reduced(swell, few))
         assert in_a_swell(calm, swell) is None
 

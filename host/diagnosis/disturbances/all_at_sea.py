@@ -14,7 +14,7 @@ from host.diagnosis.disturbances.seas import (
 )
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
-from host.diagnosis.fits.leftover import leftover
+from host.diagnosis.fits.leftover import Leftover, leftover
 from host.diagnosis.fits.margins import NAMING_MARGIN, margin
 from host.diagnosis.fits.prospects import form_gains
 from host.diagnosis.fits.sea_fits import again_in_waves, with_sea
@@ -22,12 +22,14 @@ from host.diagnosis.fits.workers import Workers
 from host.diagnosis.search.search import Search
 from host.diagnosis.search.whole_vehicle import is_real
 
+TRACE = 0.1  # of what waves are worth
+
 
 def in_a_swell(calm: Search, swell: Explanation) -> Explained | None:
     """The search from all that every vehicle has among waves estimated beside it; None if few of it pay.
 
-    Or if something is left, or waves are no likelier than white forces: as no search without them was made,
-    nothing speaks for them then.
+    Or if more is left than a trace, or waves are no likelier than white forces: as no search without them was
+    made, nothing speaks for them then.
     """
     fitter = calm.fitter
     search = search_among(calm, swell)
@@ -37,8 +39,18 @@ def in_a_swell(calm: Search, swell: Explanation) -> Explained | None:
     found, fitted = beside_own_waves(search, swell, found)
     told = told_waves(fitter, fitted, with_sea(fitter, fitted).bic - fitted.bic)
     left = left_among(fitter, told)
-    is_enough = left.is_nothing and told.delta_bic > NAMING_MARGIN
+    is_enough = told.delta_bic > NAMING_MARGIN and _is_trace(fitter, told, left)
     return Explained(found, search, left, told, is_of_all=True) if is_enough else None
+
+
+def _is_trace(fitter: Fitter, told: Waves, left: Leftover) -> bool:
+    """Whether nothing is left, or no more than a form that gains a fraction of what the waves are worth.
+
+    No sea is as the filter has it, which in large waves shows.
+    """
+    if not replace(left, is_smooth=False).is_nothing:
+        return False
+    return not left.is_smooth or max(form_gains(fitter, told.fitted).values()) < TRACE * told.delta_bic
 
 
 def again_in_a_swell(

@@ -78,7 +78,8 @@ def verdict_on(
         return "no_mismatch"
     if is_slight or (left.is_nothing and after.chi2 < worst and not unknown_in(best)):
         return "explained" if foretells and not _doubt(best, left, waves) else "partly_explained"
-    is_better = bool(known_in(best)) and after.chi2 < 0.7 * before.chi2
+    # Among waves no free run is much better either: they are named by what they are worth.
+    is_better = bool(known_in(best)) and (after.chi2 < 0.7 * before.chi2 or FAINT_WAVES < waves < inf)
     return "partly_explained" if is_better and not beyond_geometry_in(best) else "unexplained"
 
 

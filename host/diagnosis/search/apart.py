@@ -40,8 +40,21 @@ class _Taught(NamedTuple):
     whole: Explanation
 
 
-def stretches_apart(short: ShortRuns) -> list[Span]:
-    """The stretches, s, of one recording without which all that every vehicle has leaves white noise.
+class Apart(NamedTuple):
+    """What is apart: stretches, s; or all that every vehicle has with an effect, fitted to the short runs.
+
+    instead  where the effect does as much as leaving stretches out
+    """
+
+    spans: list[Span]
+    instead: Explanation | None = None
+
+
+NOTHING = Apart([])
+
+
+def stretches_apart(short: ShortRuns) -> Apart:
+    """The stretches of one recording without which all that every vehicle has leaves white noise.
 
     None where they are many. What lasts until the end is one of them if something before lasted as long: what
     changed and never comes back is in the catalogue. Of a long recording some pieces teach what every vehicle
@@ -49,13 +62,18 @@ def stretches_apart(short: ShortRuns) -> list[Span]:
     """
     pieces = short.pieces
     if (taught := _without_the_worst(short.fitter, short.whole)) is None:
-        return []
+        return NOTHING
     kept = taught.pieces if short.are_all_fitted else _followed(pieces, taught)
     starts = {piece.time[0] for piece in kept}
     apart = _joined([piece for piece in pieces if piece.time[0] not in starts])
     if not apart or len(kept) < (1.0 - MOST) * len(pieces) or _is_for_good(apart, pieces[-1]):
-        return []
-    return [] if _does_an_effect_as_much(short.fitter, short.whole, taught.whole) else apart
+        return NOTHING
+    least = SHARE * _less(short.whole, taught.whole)
+    forms = form_gains(short.fitter, short.whole)
+    if max(worth for name, worth in forms.items() if name not in IN_TIME) > least:
+        return NOTHING
+    instead = _with_an_effect(short.fitter, short.whole, least)
+    return Apart(apart) if instead is None else Apart([], instead)
 
 
 def _without_the_worst(fitter: Fitter, whole: Explanation) -> _Taught | None:
@@ -119,26 +137,21 @@ def _is_for_good(apart: list[Span], last: Recording) -> bool:
     return lasts and all(end - start > until - since + last.step for since, until in earlier)
 
 
-def _does_an_effect_as_much(fitter: Fitter, bent: Explanation, freed: Explanation) -> bool:
-    """Whether an effect does much of what leaving out did, or a form of unknown physics promises to.
+def _with_an_effect(fitter: Fitter, bent: Explanation, least: float) -> Explanation | None:
+    """All that every vehicle has with the effect that takes away most of what is left; None if not so much.
 
     What acts only far over, or fast, or deep, is as local in time as a turn. What goes with time alone is not
     asked.
-
-    bent, freed  all that every vehicle has, on all pieces and on those that are left
     """
     beside = {*IN_TIME, *SCANS, *OFFSETS, *bent.names}
     names = [one.name for one in fitter.candidates if one.name not in beside and not one.changes]
+    best = min((fitter.grown(bent, name, []) for name in names), key=lambda e: e.bic)
+    return best if _less(bent, best) > least else None
+
+
+def _less(bent: Explanation, other: Explanation) -> float:
+    """By how much the squared errors over their variance are less."""
     rows = sum(np.isfinite(e).sum(axis=1) for e in bent.fit.whitened)
-    least = SHARE * _less(rows, bent, freed)
-    forms = form_gains(fitter, bent)
-    if max(worth for name, worth in forms.items() if name not in beside) > least:
-        return True
-    return any(_less(rows, bent, fitter.grown(bent, name, [])) > least for name in names)
-
-
-def _less(rows: Array, bent: Explanation, other: Explanation) -> float:
-    """By how much the squared errors of rows (2,) over their variance are less."""
     return float(np.sum(rows * (1.0 - other.fit.noise[:2] / bent.fit.noise[:2])))
 
 
