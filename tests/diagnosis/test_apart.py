@@ -41,7 +41,13 @@ def spans_of(recordings: list[Recording]) -> list[Span]:
 
 
 @pytest.mark.parametrize(
-    ("extra", "is_apart"), [(turning, True), (lightened, False), (everywhere, False), (nothing, False)]
+    ("extra", "is_apart"),
+    [
+        pytest.param(turning, True, marks=pytest.mark.long),
+        (lightened, False),
+        (everywhere, False),
+        (nothing, False),
+    ],
 )
 def test_a_turn_is_apart_and_what_stays_is_not(extra: Extra, is_apart: bool) -> None:
     spans = spans_of([hidden_dive(extra, duration=250.0)])
@@ -52,7 +58,8 @@ def test_a_turn_is_apart_and_what_stays_is_not(extra: Extra, is_apart: bool) -> 
         assert ENDS - 2.0 < end < ENDS + 1.5 * pieces.PIECE
 
 
-def test_a_sensor_that_was_silent_for_a_while_is_no_stretch_apart() -> None:
+def test_a_sensor_that_was_silent_for_a_while_is_no_stretch_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(apart, "_with_an_effect", lambda *_: None)
     dive = hidden_dive(turning, duration=250.0)
     dive.pitch[300:600], dive.depth[:20] = np.nan, np.nan
     ((start, end),) = spans_of([dive])
@@ -79,6 +86,7 @@ def test_of_a_long_recording_some_pieces_teach_and_all_are_judged(monkeypatch: p
     dive = hidden_dive(turning, duration=500.0)
     taught: list[int] = []
     fitted = pieces.best_of_all
+    monkeypatch.setattr(apart, "_with_an_effect", lambda *_: None)
     monkeypatch.setattr(pieces, "MOST_ROWS", dive.time.size - 1)
     monkeypatch.setattr(pieces, "SPREAD", dive.time.size // 2)
     monkeypatch.setattr(
