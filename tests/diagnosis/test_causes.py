@@ -50,6 +50,13 @@ def test_a_coefficient_of_no_size_or_another_sign_says_nothing() -> None:
     assert causes({"a3": known["a3"]}) == []
 
 
+def test_of_two_that_do_as_well_neither_is_told() -> None:
+    stiff = pairs(righting_moment=0.5)
+    assert causes({"a3": stiff["a3"]}) == []  # the inertia would do as well
+    (told,) = causes({name: stiff[name] for name in ("a3", "b2")})
+    assert told.name == "righting_moment"
+
+
 def compared(*different: str, **factors: float) -> Comparison:
     parameters = [
         ParameterDifference(name=name, recorded=here, given=there, is_different=name in different)

@@ -29,6 +29,7 @@ CAUSES: Mapping[str, Mapping[str, int]] = MappingProxyType(
 """The power of each cause in the coefficients that it changes."""
 SIGNIFICANCE = 1e-3  # chance that factors that do explain the ratios are held not to, or that one is 1
 ROUGHLY = 0.03  # of a ratio: what is too small to be named on either side bends them so far
+CLEARLY = 6.0  # of the misfit, by which another set of as many factors is less likely
 TOLD = 5.0  # deviations from zero: a ratio of less says nothing
 Value = tuple[float, float]
 
@@ -49,6 +50,8 @@ class Cause:
 def causes(pairs: Mapping[str, tuple[Value, Value]]) -> list[Cause]:
     """The fewest factors that make the coefficients of one side those of the other; none where none do.
 
+    Of several sets of as many that do about as well, those which all of them hold.
+
     pairs  each coefficient of the base equations with its deviation, as recorded and as given
     """
     known = {name: pair for name, pair in pairs.items() if _has_ratio(*pair)}
@@ -60,9 +63,13 @@ def causes(pairs: Mapping[str, tuple[Value, Value]]) -> list[Cause]:
         misfit, logs, deviations, names = min(found, key=lambda one: one[0])
         if misfit <= chi2.isf(SIGNIFICANCE, max(len(ratios) - count, 1)):
             break
+    sure = set.intersection(*(set(one[3]) for one in found if one[0] < misfit + CLEARLY))
     least = norm.isf(SIGNIFICANCE / 2.0)
-    told = zip(names, logs.tolist(), deviations.tolist(), strict=True)
-    return [Cause(name, float(np.exp(x)), float(np.exp(x) * s)) for name, x, s in told if abs(x) > least * s]
+    return [
+        Cause(name, float(np.exp(x)), float(np.exp(x) * s))
+        for name, x, s in zip(names, logs.tolist(), deviations.tolist(), strict=True)
+        if name in sure and abs(x) > least * s
+    ]
 
 
 def _has_ratio(recorded: Value, given: Value) -> bool:

@@ -104,13 +104,14 @@ def _followed(pieces: list[Recording], taught: _Taught) -> list[Recording]:
     left = _left_by(pieces, taught.whole)
     is_doubted = (left > _most(left)) & (left < BENT)
     doubted = [piece for piece, doubt in zip(pieces, is_doubted, strict=True) if doubt]
-    few = np.linspace(0, len(doubted) - 1, min(len(doubted), len(taught.pieces)))
-    more = {piece.time[0]: piece for piece in [*taught.pieces, *(doubted[round(k)] for k in few)]}
-    fitter = Fitter([more[time] for time in sorted(more)])
-    again = _without_the_worst(fitter, best_of_all(fitter))
-    if again is None:
-        return []
-    left = _left_by(pieces, again.whole)
+    if doubted:
+        few = np.linspace(0, len(doubted) - 1, min(len(doubted), len(taught.pieces)))
+        more = {piece.time[0]: piece for piece in [*taught.pieces, *(doubted[round(k)] for k in few)]}
+        fitter = Fitter([more[time] for time in sorted(more)])
+        again = _without_the_worst(fitter, best_of_all(fitter))
+        if again is None:
+            return []
+        left = _left_by(pieces, again.whole)
     most = NOT_TAUGHT * max(float(np.median(left)), 1.0)
     return [piece for piece, each in zip(pieces, left, strict=True) if each <= most]
 
