@@ -1,10 +1,12 @@
-"""The derivatives of one Runge-Kutta sub-step, stage by stage.
+"""The derivatives of one Runge-Kutta sub-step, stage by stage, from the last to the first.
 
-With k_i = f(y_i, plane_i) the slopes of its four stages, all derivatives follow from those of f there:
+With k_i = f(y_i, plane_i) the slopes of its four stages, and L_i what the state after it gains by k_i,
 
-    dk_i = f_y dy_i + f_plane dplane_i + f_p,    dy_i and dplane_i by the slopes of the stages before.
+    L_i f_y  goes to what y_i is made of: the state, the parameters and the k_j before,
+    L_i f_plane  to what the plane's angle is made of,    L_i f_p  to the parameters.
 
-CasADi would carry each direction through every operation of the sub-step, which are half as many more.
+Backwards, as what comes out is a few states, and what goes in is those and several times as many
+parameters: CasADi, and stage by stage forwards, would carry each of these through all.
 """
 
 from functools import lru_cache
@@ -16,35 +18,36 @@ from host.dynamics.propagate import Form, slope_of
 
 
 class _Stages:
-    """Stands for the slope f of the state: gives a symbol for each k_i, and notes its value and slopes."""
+    """Stands for the slope f of the state: gives a symbol for each k_i, and notes where it is taken."""
 
-    def __init__(self, form: Form, x: ca.SX, p: ca.SX) -> None:
-        self.form, self.all = form, ca.vertcat(x, p)
+    def __init__(self, form: Form) -> None:
+        self.form = form
         self.symbols: list[ca.SX] = []
-        self.values: list[ca.SX] = []
-        self.slopes: list[ca.SX] = []
+        self.taken: list[tuple[ca.SX, ...]] = []
 
-    def __call__(self, y: ca.SX, time: ca.SX, plane: ca.SX, p: ca.SX, drive: ca.SX) -> ca.SX:
-        f_y, f_plane, f_p = _slopes_of_slope(self.form)(y, time, plane, p, drive)
-        own = ca.horzcat(ca.SX(self.form.nx, self.form.nx), f_p)
-        self.slopes.append(f_y @ self.total(y) + f_plane @ self.total(plane) + own)
-        self.values.append(slope_of(self.form)(y, time, plane, p, drive))
+    def __call__(self, *taken: ca.SX) -> ca.SX:
+        self.taken.append(taken)
         self.symbols.append(ca.SX.sym("k", self.form.nx))
         return self.symbols[-1]
-
-    def total(self, value: ca.SX) -> ca.SX:
-        """How a value changes with the state and the parameters, also by way of the stages so far."""
-        slopes = ca.jacobian(value, self.all)
-        for k, by_all in zip(self.symbols, self.slopes, strict=True):
-            slopes += ca.jacobian(value, k) @ by_all
-        return slopes
 
 
 def substep_slopes(form: Form, x: ca.SX, p: ca.SX, drive: ca.SX, number: ca.SX) -> list[ca.SX]:
     """F_x (nx, nx) and F_p (nx, parameters) of sub-step `number` of a row, counted from 0."""
-    stages = _Stages(form, x, p)
-    slopes = stages.total(form.substep(x, p, drive, number, stages))
-    _, (slopes,) = ca.substitute_inplace(stages.symbols, stages.values, [slopes])
+    stages = _Stages(form)
+    after = form.substep(x, p, drive, number, stages)
+    by_all = ca.vertcat(x, p)
+    slopes = ca.jacobian(after, by_all)
+    gains = [ca.jacobian(after, k) for k in stages.symbols]
+    for stage in range(len(stages.symbols) - 1, -1, -1):
+        y, _, plane, *_ = taken = stages.taken[stage]
+        f_y, f_plane, f_p = _slopes_of_slope(form)(*taken)
+        slopes += ca.horzcat(ca.SX(form.nx, form.nx), gains[stage] @ f_p)
+        for value, gain in ((y, gains[stage] @ f_y), (plane, gains[stage] @ f_plane)):
+            slopes += gain @ ca.jacobian(value, by_all)
+            for before in range(stage):
+                gains[before] += gain @ ca.jacobian(value, stages.symbols[before])
+    values = [slope_of(form)(*taken) for taken in stages.taken]
+    _, (slopes,) = ca.substitute_inplace(stages.symbols, values, [slopes])
     return [slopes[:, : form.nx], slopes[:, form.nx :]]
 
 

@@ -52,10 +52,11 @@ def whiten(error: Array, sensitivity: Array, variance: Array) -> tuple[Array, Ar
 
 def _normal(error: Array, scores: Array, free: Mask) -> tuple[Array, Array]:
     """Normal matrix and right-hand side of the free parameters and the initial state."""
-    J = np.concatenate([scores[:, : free.size][:, free], scores[:, free.size :]], axis=1)
-    flat = J.transpose(1, 0, 2).reshape(int(free.sum()) + NX0, -1)
+    kept = np.append(free, np.ones(NX0, dtype=bool))
+    slopes = list(scores) if kept.all() else [channel[kept] for channel in scores]
     with np.errstate(all="ignore"):  # a model that has run away is seen by its numbers
-        return flat @ flat.T, flat @ error.ravel()
+        normal = np.sum([J @ J.T for J in slopes], axis=0)
+        return normal, np.sum([J @ e for J, e in zip(slopes, error, strict=True)], axis=0)
 
 
 class GaussNewton:

@@ -12,7 +12,7 @@ from host.dynamics.propagate import Inputs, Run, free_run
 from host.dynamics.sensitivities import sensitivities
 from host.likelihood.filter_error import whitened_innovations
 from host.likelihood.fit import Fit, finished, run_away
-from host.likelihood.gauss_newton import GaussNewton, Mask, Point, whiten
+from host.likelihood.gauss_newton import GaussNewton, Mask, Point
 from host.likelihood.interval_likelihood import (
     LEAST_DEVIATION,
     likeliest_deviation,
@@ -168,8 +168,9 @@ def _whitened_by(
     noise: Array, parts: list[tuple[Array, Array]], inputs: list[Inputs]
 ) -> list[tuple[Array, Array]]:
     """Residuals e and sensitivities S such that S^T e is the score and S^T S the information."""
-    variance = np.array([[noise[0]], [0.0], [noise[1]]])
-    white = [whiten(e, S, np.repeat(variance, e.shape[1], axis=1)) for e, S in parts]
+    scale = np.sqrt(noise[:2])
+    with np.errstate(over="ignore", invalid="ignore"):  # what has run away becomes infinite
+        white = [(e / scale[:, None], S / scale[:, None, None]) for e, S in parts]
     steps = inputs[0].steps
     for i in np.flatnonzero(steps):
         deviation = _before_rounding(noise[i], steps[i])

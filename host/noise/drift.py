@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 import numpy as np
 
-from host.compiled.linear_recursion import linear_recursion
+from host.compiled.linear_filter import linear_filter
 from host.compiled.over_rows import over_rows
 from host.recordings.recording import Array, Recording
 
@@ -51,8 +51,6 @@ class Drift:
 class Whitening:
     """The filter over one channel's residuals.
 
-    gain    (nx, N) of the states, 0 where nothing was measured
-    moves   (N, nx, nx) the states' transition to the next row
     seen    (nx,) 1 for a state that shows in the channel
     spread  (N,) innovation variance over that of white noise, 1 where nothing was measured
     doubt   (N,) the same everywhere, of what a measurement would bring
@@ -60,9 +58,12 @@ class Whitening:
 
     def __init__(self, drift: Drift) -> None:
         kinds = drift.kinds
-        self.moves, self.seen = _moves(drift), _seen(kinds)
+        self.seen = _seen(kinds)
         table = _filtered(drift, np.zeros(drift.present.size))
-        self.spread, self.doubt, self.gain = table[1], table[2], table[3:]
+        self.spread, self.doubt = table[1:3]
+        self._deviation = np.sqrt(self.spread)
+        moves, K = _moves(drift), table[3:].T[:, :, None]
+        self._closed, self._driven = moves @ (np.eye(self.seen.size) - K * self.seen), (moves @ K)[:, :, 0]
 
     @property
     def charge(self) -> float:
@@ -71,18 +72,16 @@ class Whitening:
 
     def whitened(self, values: Array) -> Array:
         """Residuals or sensitivities (c, N), filtered; white residuals keep the sensor's variance."""
-        return np.asarray((values - self.foreseen(values)) / np.sqrt(self.spread))
+        foreseen = self.foreseen(values)
+        np.subtract(values, foreseen, out=foreseen)
+        foreseen /= self._deviation
+        return foreseen
 
     def foreseen(self, values: Array) -> Array:
         """What the filter expects of each row of (c, N) values before it: x(k+1) = A_k (x + K (y - C x))."""
-        K = self.gain.T[:, :, None]
-        closed = self.moves @ (np.eye(self.seen.size) - K * self.seen)
-        driven = (self.moves @ K) * values.T[:, None, :]
-        start = np.zeros((self.seen.size, values.shape[0]))
         # A trial may run away: what is infinite is refused by its likelihood.
         with np.errstate(invalid="ignore", over="ignore"):
-            states = linear_recursion(closed, driven, start)
-        return np.asarray(np.einsum("kxc,x->ck", states, self.seen))
+            return linear_filter(self._closed, self._driven, self.seen, values)
 
 
 Whitenings = tuple[Whitening | None, Whitening | None]

@@ -57,7 +57,7 @@ def test_only_what_is_asked_for_is_worked_out(has_compiler: bool, monkeypatch: p
         monkeypatch.setattr("host.compiled.all_rows._compiled", lambda: None)
     by_x, by_p = every(rows, parameters)
     few = every.with_columns(1, (1, 3))
-    assert len(few._program) < len(every._program)
+    assert len(few._laid.steps) < len(every._laid.steps)
     some_x, some_p = few(rows, parameters)
     np.testing.assert_array_equal(some_x, by_x)
     np.testing.assert_array_equal(some_p, by_p[:, :, [1, 3]])
