@@ -14,7 +14,7 @@ from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.leftover import Leftover
 from host.diagnosis.fits.sea_fits import WAVES, again_in_waves, again_under_forces, with_regular_waves
-from host.diagnosis.fits.workers import Workers
+from host.diagnosis.fits.workers import Workers, sharing
 from host.diagnosis.plane_choice import Way, is_likelier, likelier_first, ways
 from host.diagnosis.plane_moments import with_plane_moments
 from host.diagnosis.proof.deviations import deviations
@@ -127,9 +127,10 @@ def diagnose(
     check_signs(seen)
     seen = noted(seen, units_note(seen))
     seen = seen if may_be_quiet else as_sensed(seen)
-    seen = with_plane_moments(seen, on_progress)
-    first, *others = likelier_first(ways(seen), on_progress, jobs, may_leave_out)
-    return _diagnosed(first, others, on_progress, jobs, like, [])
+    with sharing(jobs):
+        seen = with_plane_moments(seen, on_progress)
+        first, *others = likelier_first(ways(seen), on_progress, jobs, may_leave_out)
+        return _diagnosed(first, others, on_progress, jobs, like, [])
 
 
 def _diagnosed(

@@ -13,6 +13,7 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
+from host.compiled.side_by_side import side_by_side
 from host.likelihood.gauss_newton import GaussNewton, Mask, Point
 from host.likelihood.start_prior import start_cost
 from host.recordings.recording import Array
@@ -139,7 +140,7 @@ def _scored(here: Place[P], model: NoiseModel[P], step: GaussNewton) -> GaussNew
     strides[point.parameters[step.free] + strides > upper] *= -1.0
     starts = [STRIDE / np.sqrt(np.diag(Hxx)) for _, Hxx, _ in step.own]
     with np.errstate(all="ignore"):
-        moved = [model.passes(moved_point) for moved_point in step.moved(strides, starts)]
+        moved = side_by_side(model.passes, list(step.moved(strides, starts)))
     normal = []
     for k, (run, own) in enumerate(zip(here.passes, starts, strict=True)):
         score, information = _score(run, [passes[k] for passes in moved], np.concatenate([strides, own]))
@@ -160,13 +161,8 @@ class _Scoring(Generic[P]):
         levels = self.noise.size
         self.score, self.information = np.zeros(levels), np.zeros((levels, levels))
         with np.errstate(all="ignore"):
-            self._add_up(
-                here,
-                [
-                    model.passes(here.point.with_noise(self._moved(DIFFERENCE * one)))
-                    for one in np.eye(levels)
-                ],
-            )
+            moved = [here.point.with_noise(self._moved(DIFFERENCE * one)) for one in np.eye(levels)]
+            self._add_up(here, side_by_side(model.passes, moved))
         lost = ~np.isfinite(self.score) | ~np.isfinite(np.diag(self.information))
         self.score[lost] = 0.0
         self.information[lost, :] = self.information[:, lost] = 0.0

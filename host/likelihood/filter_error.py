@@ -5,6 +5,7 @@ Source: Maine and Iliff, NASA RP-1138; Klein and Morelli, Aircraft System Identi
 
 import numpy as np
 
+from host.compiled.side_by_side import side_by_side
 from host.dynamics.propagate import Inputs
 from host.dynamics.sensitivities import innovations
 from host.likelihood.ascent import SETTLED, ascend, place
@@ -26,18 +27,18 @@ class RandomForces:
 
     def passes(self, point: Point) -> list[KalmanPass]:
         """The extended Kalman filter over each recording."""
-        return [
-            kalman_pass(point.parameters, x0, point.noise, one)
-            for x0, one in zip(point.initial, self.inputs, strict=True)
-        ]
+        each = list(zip(point.initial, self.inputs, strict=True))
+        return side_by_side(lambda one: kalman_pass(point.parameters, one[0], point.noise, one[1]), each)
 
     def whitened(self, point: Point, passes: list[KalmanPass]) -> list[tuple[Array, Array]]:
         """Sensitivities at fixed gain."""
-        white = []
-        for run, x0, one in zip(passes, point.initial, self.inputs, strict=True):
-            error, sensitivity = innovations(point.parameters, x0, one, run.gains)
-            white.append(whiten(error, sensitivity, run.variance))
-        return white
+        each = list(zip(passes, point.initial, self.inputs, strict=True))
+        return side_by_side(lambda one: _whitened(point, *one), each)
+
+
+def _whitened(point: Point, run: KalmanPass, initial: Array, inputs: Inputs) -> tuple[Array, Array]:
+    error, sensitivity = innovations(point.parameters, initial, inputs, run.gains)
+    return whiten(error, sensitivity, run.variance)
 
 
 def filter_error(start: Fit, inputs: list[Inputs], most_steps: int = 40) -> Fit:

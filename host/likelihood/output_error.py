@@ -8,6 +8,7 @@ and step^2 / 12.
 
 import numpy as np
 
+from host.compiled.side_by_side import side_by_side
 from host.dynamics.propagate import Inputs, Run, free_run
 from host.dynamics.sensitivities import sensitivities
 from host.likelihood.filter_error import whitened_innovations
@@ -138,7 +139,8 @@ def _cost(point: Point, runs: list[Run], inputs: list[Inputs]) -> tuple[Array, f
 
 
 def _free_runs(point: Point, inputs: list[Inputs]) -> list[Run]:
-    return [free_run(point.parameters, x0, one) for x0, one in zip(point.initial, inputs, strict=True)]
+    each = list(zip(point.initial, inputs, strict=True))
+    return side_by_side(lambda one: free_run(point.parameters, *one), each)
 
 
 def _errors(runs: list[Run], inputs: list[Inputs]) -> list[Array]:
@@ -158,10 +160,12 @@ def _whitened(values: Array, inputs: Inputs) -> Array:
 
 
 def _innovations(point: Point, runs: list[Run], inputs: list[Inputs]) -> list[tuple[Array, Array]]:
-    each = zip(_errors(runs, inputs), runs, point.initial, inputs, strict=True)
-    return [
-        (error, _whitened(sensitivities(point.parameters, x0, one, run), one)) for error, run, x0, one in each
-    ]
+    each = list(zip(_errors(runs, inputs), runs, point.initial, inputs, strict=True))
+    return side_by_side(lambda one: _innovation(point, *one), each)
+
+
+def _innovation(point: Point, error: Array, run: Run, initial: Array, inputs: Inputs) -> tuple[Array, Array]:
+    return error, _whitened(sensitivities(point.parameters, initial, inputs, run), inputs)
 
 
 def _whitened_by(
