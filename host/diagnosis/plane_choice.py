@@ -88,7 +88,7 @@ def likelier_first(
     if may_leave_out and whole is not None and leading.fitter.excess(whole.fit) > MUCH:
         on_progress("stretches of other physics")
         short = short_runs(leading.recordings)
-        apart, instead = NOTHING if short is None else stretches_apart(short)
+        apart, instead = NOTHING if short is None else stretches_apart(short, jobs)
         if apart:
             rest = likelier_first(ways(without(leading.recordings, apart, APART)), on_progress, jobs)
             return [way._replace(apart=tuple(apart)) for way in rest]

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from host.catalogue import named, structure_of
+from host.compiled.side_by_side import side_by_side
 from host.diagnosis.fits.absence import one_step_without
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.setting import Setting
@@ -196,10 +197,12 @@ class Fitter(Setting):
         inputs, free = self.inputs(names), self.free(names)
         least = -np.inf if rival is None else rival.log_likelihood
         if starts[0].noise[2:].any():
-            ends = [climbed(self, start, True, least - MADE_UP_FOR, TOLERANCE) for start in starts]
+            ends = side_by_side(lambda one: climbed(self, one, True, least - MADE_UP_FOR, TOLERANCE), starts)
             return max(ends, key=lambda fit: fit.log_likelihood)
         hopeless = least - (0.0 if rival is None else HOPELESS * rival.samples)
-        fits = [output_error(start, inputs, free, first, TOLERANCE, hopeless) for start in starts]
+        fits = side_by_side(
+            lambda start: output_error(start, inputs, free, first, TOLERANCE, hopeless), starts
+        )
         best = max(fits, key=lambda fit: fit.log_likelihood)
         if best.log_likelihood < hopeless:
             return best

@@ -17,6 +17,7 @@ from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LITTLE
 from host.diagnosis.fits.prospects import form_gains
+from host.diagnosis.fits.workers import Workers
 from host.diagnosis.search.outset import IN_TIME, says_all
 from host.diagnosis.search.short_runs import ShortRuns, best_of_all
 from host.likelihood.output_error import output_error
@@ -53,7 +54,7 @@ class Apart(NamedTuple):
 NOTHING = Apart([])
 
 
-def stretches_apart(short: ShortRuns) -> Apart:
+def stretches_apart(short: ShortRuns, jobs: int = 1) -> Apart:
     """The stretches of one recording without which all that every vehicle has leaves white noise.
 
     None where they are many. What lasts until the end is one of them if something before lasted as long: what
@@ -72,7 +73,7 @@ def stretches_apart(short: ShortRuns) -> Apart:
     forms = form_gains(short.fitter, short.whole)
     if max(worth for name, worth in forms.items() if name not in IN_TIME) > least:
         return NOTHING
-    instead = _with_an_effect(short.fitter, short.whole, least)
+    instead = _with_an_effect(short.fitter, short.whole, least, jobs)
     return Apart(apart) if instead is None else Apart([], instead)
 
 
@@ -138,7 +139,7 @@ def _is_for_good(apart: list[Span], last: Recording) -> bool:
     return lasts and all(end - start > until - since + last.step for since, until in earlier)
 
 
-def _with_an_effect(fitter: Fitter, bent: Explanation, least: float) -> Explanation | None:
+def _with_an_effect(fitter: Fitter, bent: Explanation, least: float, jobs: int) -> Explanation | None:
     """All that every vehicle has with the effect that takes away most of what is left; None if not so much.
 
     What acts only far over, or fast, or deep, is as local in time as a turn. What goes with time alone is not
@@ -146,7 +147,9 @@ def _with_an_effect(fitter: Fitter, bent: Explanation, least: float) -> Explanat
     """
     beside = {*IN_TIME, *SCANS, *OFFSETS, *bent.names}
     names = [one.name for one in fitter.candidates if one.name not in beside and not one.changes]
-    best = min((fitter.grown(bent, name, []) for name in names), key=lambda e: e.bic)
+    with Workers(fitter, jobs) as workers:
+        grown: list[Explanation] = workers.results([(Fitter.grown, (bent, name, [])) for name in names])
+    best = min(grown, key=lambda e: e.bic)
     return best if _less(bent, best) > least else None
 
 
