@@ -23,6 +23,9 @@ DEGREE = 7  # of what wanders slowly: about as many turns as a tide or a leak ta
 SWING_PERIODS = (2.0, 20000.0)  # s
 SPANS = {side: f"wander_{side}_span" for side in SIDES}
 """The parameters that hold the length of the recording, s, over which a force wanders."""
+SHALLOWEST = {side: f"layers_{side}_top" for side in SIDES}
+DEEPEST = {side: f"layers_{side}_bottom" for side in SIDES}
+"""The parameters that hold the depths, m, between which a force goes with the depth."""
 
 Term = Callable[[tuple[ca.SX, ...]], ca.SX]
 
@@ -132,27 +135,36 @@ ANY_SMOOTH_FORCE = Effect(
 shows as a gain of these, where random forces show none."""
 
 
+def _chebyshev(c: Chain, names: tuple[str, ...], x: ca.SX) -> ca.SX:
+    """Sum of the parameters times Chebyshev polynomials, T_k+1 = 2 x T_k - T_k-1; beyond 1 as at 1."""
+    x = ca.fmax(-1, ca.fmin(x, 1))
+    before, now, value = ca.SX(1), x, ca.SX(0)
+    for name in names:
+        value += c.p[name] * now
+        before, now = now, 2 * x * now - before
+    return value
+
+
+def _shares(side: Side, names: tuple[str, ...]) -> tuple[Parameter, ...]:
+    limit = {"heave": 5.0, "pitch": 20.0}[side]
+    return tuple(
+        Parameter(name=name, unit=UNIT[side], lower=-limit, upper=limit, meaning="of Chebyshev's")
+        for name in names
+    )
+
+
 def _wandering(side: Side) -> Effect:
     names = tuple(f"wander_{side}_{k}" for k in range(1, DEGREE + 1))
 
     def force(c: Chain) -> None:
-        # Chebyshev polynomials of the time, T_k+1 = 2 x T_k - T_k-1; after the recording its last value.
-        x = ca.fmin(2 * c.time / c.p[SPANS[side]] - 1, 1)
-        before, now, value = ca.SX(1), x, ca.SX(0)
-        for name in names:
-            value += c.p[name] * now
-            before, now = now, 2 * x * now - before
+        value = _chebyshev(c, names, 2 * c.time / c.p[SPANS[side]] - 1)
         setattr(c, side, getattr(c, side) + value)
 
-    limit = {"heave": 5.0, "pitch": 20.0}[side]
     return Effect(
         name=f"unknown_wandering_{KIND[side]}",
         slot=side,
         parameters=(
-            *(
-                Parameter(name=name, unit=UNIT[side], lower=-limit, upper=limit, meaning="of Chebyshev's")
-                for name in names
-            ),
+            *_shares(side, names),
             Parameter(name=SPANS[side], unit="s", lower=1.0, upper=1e6, meaning="length of the recording"),
         ),
         sentence=f"A {KIND[side]} acts that wanders slowly with time, whatever the vehicle does.",
@@ -160,6 +172,31 @@ def _wandering(side: Side) -> Effect:
         manoeuvre="a straight level run as long as this one",
         probes=((*((0.0,) * DEGREE), 1.0),),
         scales=(*(("",) * DEGREE), "duration"),
+        sizes=names,
+        force=force,
+    )
+
+
+def _in_layers(side: Side) -> Effect:
+    names = tuple(f"layers_{side}_{k}" for k in range(1, DEGREE + 1))
+    top, bottom = SHALLOWEST[side], DEEPEST[side]
+
+    def force(c: Chain) -> None:
+        x = 2 * (c.zeta - c.p[top]) / (c.p[bottom] - c.p[top]) - 1
+        setattr(c, side, getattr(c, side) + _chebyshev(c, names, x))
+
+    return Effect(
+        name=f"unknown_{KIND[side]}_in_layers",
+        slot=side,
+        parameters=(
+            *_shares(side, names),
+            Parameter(name=top, unit="m", lower=-100.0, upper=12000.0, meaning="least depth"),
+            Parameter(name=bottom, unit="m", lower=-100.0, upper=12000.0, meaning="greatest depth"),
+        ),
+        sentence=f"A {KIND[side]} acts that goes with the depth, as in water that lies or moves in layers.",
+        equation=f"{RATE[side]} = ... + sum of layers_{side}_k T_k(2 (zeta - {top})/({bottom} - {top}) - 1)",
+        manoeuvre="a slow dive through all depths and back with the planes level",
+        probes=((*((0.0,) * DEGREE), 0.0, 1.0),),
         sizes=names,
         force=force,
     )
@@ -190,9 +227,13 @@ AS_OF_PLANE = {
 WANDERING = frozenset(f"unknown_wandering_{kind}" for kind in KIND.values())
 """Of so many terms in time that any slow motion can be followed with them."""
 
+IN_LAYERS = tuple(_in_layers(side) for side in SIDES)
+"""Asked only of a vehicle that dives: over less, anything goes with the depth."""
+
 FORMS: tuple[Effect, ...] = (
     *(_of_motion(side, shape, term) for side in SIDES for shape, term in SHAPES.items()),
     *(_of_plane(shape, term) for shape, term in PLANE_SHAPES.items()),
     *(_wandering(side) for side in SIDES),
     SWINGING_MOMENT,
+    *IN_LAYERS,
 )

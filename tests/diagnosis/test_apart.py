@@ -139,7 +139,7 @@ def test_what_is_apart_is_left_out_and_told(monkeypatch: pytest.MonkeyPatch) -> 
 
     monkeypatch.setattr(plane_choice, "ways", begun)
     monkeypatch.setattr(plane_choice, "short_runs", lambda _: rest)
-    monkeypatch.setattr(plane_choice, "stretches_apart", lambda _: apart.Apart([(BEGINS, ENDS)]))
+    monkeypatch.setattr(plane_choice, "stretches_apart", lambda *_: apart.Apart([(BEGINS, ENDS)]))
     monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: None if rest else whole)
     monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)
     (way,) = likelier_first([Way([dive], cast("Any", fitter))], lambda _: None, 1, may_leave_out=True)

@@ -8,11 +8,12 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import BY_NAME, UNKNOWN, named, structure_of
-from host.catalogue.unknown import AS_OF_PLANE, FORMS
+from host.catalogue.unknown import AS_OF_PLANE, DEGREE, FORMS, IN_LAYERS
 from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.prospects import form_gains, gain
+from host.diagnosis.fits.setting import DIVE
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.search import beam
 from host.diagnosis.search.lone_form import likely_forms, lone_form
@@ -65,6 +66,36 @@ def test_a_mass_that_turns_is_unexplained_and_described(tmp_path: Path) -> None:
     model = read_model(path)
     assert [effect["name"] for effect in model.effects] == ["unknown_swinging_moment"]
     assert predict(model, dive).score.depth_rmse_m < 0.05
+
+
+def layer(_: float, x: np.ndarray, __: float) -> tuple[float, float, float]:  # type: ignore[type-arg]
+    return 0.15 / np.cosh((x[3] - 24.0) / 3.0) ** 2, 0.0, 0.0
+
+
+def test_water_in_layers_shows_as_a_force_that_goes_with_the_depth() -> None:
+    fitter = Fitter([hidden_dive(layer, duration=100.0)])
+    gains = form_gains(fitter, fitter.root)
+    assert max(gains, key=lambda name: gains[name]) == "unknown_force_in_layers"
+    found = fitter.grown(fitter.root, "unknown_force_in_layers", [])
+    assert fitter.excess(found.fit) < 1.5
+    assert fitter.free_parameters(found.names) - fitter.free_parameters(fitter.root.names) == DEGREE
+
+
+def test_a_vehicle_that_hardly_dives_is_not_asked_for_layers() -> None:
+    dive = hidden_dive(duration=30.0)
+    level = replace(dive, depth=20.0 + (dive.depth - 20.0) * DIVE / np.ptp(dive.depth) * 0.9)
+    assert {*FORMS} - {*Fitter([level]).forms} == {*IN_LAYERS}
+    deeper = replace(dive, depth=20.0 + (dive.depth - 20.0) * DIVE / np.ptp(dive.depth) * 1.1)
+    assert Fitter([deeper]).forms == FORMS
+
+
+@pytest.mark.long
+def test_a_layer_is_none_of_the_catalogue_and_is_described() -> None:
+    found = diagnose([hidden_dive(layer, duration=100.0)])
+    assert found.verdict in ("partly_explained", "unexplained")
+    assert "unknown_force_in_layers" in found.extended.names
+    assert "goes with the depth" in found.remaining
+    assert {effect.name for effect in found.effects} <= {"vertical_current", "net_buoyancy"}  # its mean
 
 
 def test_what_forms_promise_is_foretold_together_as_one_by_one() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from host.catalogue import named, structure_of
 from host.catalogue.moments import COUNT, FIRST, LAST, SCANS, sizes
-from host.catalogue.unknown import ANY_SMOOTH_FORCE, FORMS, SHAPES
+from host.catalogue.unknown import ANY_SMOOTH_FORCE, SHAPES
 from host.diagnosis.fits.explanation import Explanation
 from host.dynamics.equations import Effect
 from host.dynamics.propagate import Inputs
@@ -53,7 +53,7 @@ def form_gains(fitter: "Fitter", parent: Explanation) -> dict[str, float]:
     free = fitter.free(names) & ~np.isin(own, any_smooth)
     before, charge = parent.fit.deviance, log(parent.fit.samples)
     gains = {}
-    for form in FORMS:
+    for form in fitter.forms:
         if form.name in parent.names:
             continue
         kind, _, shape = form.parameters[0].name.partition("_")

@@ -8,7 +8,7 @@ import numpy as np
 from host.catalogue import CATALOGUE, CHANGES, NEAR_THE_SURFACE, named, structure_of
 from host.catalogue.moments import FIRST, LAST
 from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE, SPEED_CORRECTION, has_memory
-from host.catalogue.unknown import SPANS
+from host.catalogue.unknown import DEEPEST, FORMS, IN_LAYERS, SHALLOWEST, SPANS
 from host.diagnosis.fits.charges import charged_bic
 from host.diagnosis.fits.corrected_speed import SpeedReadings, speed_readings, strayed
 from host.diagnosis.fits.explanation import Explanation, Names
@@ -30,6 +30,7 @@ from host.recordings.rounding import NO_STEPS, thinned
 ALARM_EARLY = 30.0  # s, by which a moment that somebody names may lie before the change
 SLIGHT = 2e-3  # of the variance of all force: 4 % of it, about as much as any model is off
 SHALLOW = 4.0  # m; the surface pulls at a hull within a few of its diameters
+DIVE = 5.0  # m; over less, what goes with the depth hardly differs from what goes with anything
 SURGE = {"speed_time": 10.0, "c_ud": 0.0, "c_uq": 0.0}
 """Coefficients of the surge equation, and what they are where nothing tells them."""
 
@@ -42,6 +43,7 @@ class Setting:
     speed_errors  how those of a measured speed make depth drift, where that matters
     wander   (3, 2) of what else drifts (host.noise.drift), variances in units of white noise
     held     parameters that are not estimated, and their values
+    forms    of unknown physics that are tried
     candidates  entries that are tried: what changes at one moment only after an alarm, or as `eligible` tells
     """
 
@@ -70,7 +72,11 @@ class Setting:
         self.held[FIRST] = min(float(r.time[0]) for r in recordings)
         self.held[LAST] = max(float(r.time[-1]) for r in recordings)
         self.candidates: tuple[Effect, ...] = CATALOGUE
-        if np.nanmin(np.concatenate([recording.depth for recording in recordings])) < SHALLOW:
+        depths = np.concatenate([recording.depth for recording in recordings])
+        top, bottom = float(np.nanmin(depths)), float(np.nanmax(depths))
+        self.held |= dict.fromkeys(SHALLOWEST.values(), top) | dict.fromkeys(DEEPEST.values(), bottom)
+        self.forms = FORMS if bottom - top > DIVE else tuple(one for one in FORMS if one not in IN_LAYERS)
+        if top < SHALLOW:
             self.candidates += NEAR_THE_SURFACE
         alarms = [alarm for recording in recordings for alarm in recording.alarms]
         if alarms:
