@@ -11,21 +11,25 @@ from typing import Literal
 import casadi as ca
 
 from host.catalogue.oscillation import oscillation, oscillation_parameters
-from host.dynamics.equations import Chain, Effect, Parameter
+from host.dynamics.equations import Chain, Effect, Parameter, Slot
 
 Side = Literal["heave", "pitch"]
 SIDES: tuple[Side, Side] = ("heave", "pitch")
 KIND = {"heave": "force", "pitch": "moment"}
-RATE = {"heave": "w'", "pitch": "q'"}
-UNIT = {"heave": "m/s^2", "pitch": "rad/s^2"}
+LAYERED_KIND = {**KIND, "climb": "current"}
+SLOT: dict[str, Slot] = {"heave": "heave", "pitch": "pitch", "climb": "environment"}
+RATE = {"heave": "w'", "pitch": "q'", "climb": "zeta'"}
+UNIT = {"heave": "m/s^2", "pitch": "rad/s^2", "climb": "m/s"}
+MOST = {"heave": 5.0, "pitch": 20.0, "climb": 5.0}
 MOTION = ("w", "q", "theta", "delta")
 DEGREE = 7  # of what wanders slowly: about as many turns as a tide or a leak takes in one recording
+LAYERS = 11  # the same of what goes with the depth: a layer a quarter as thick as the dive is deep
 SWING_PERIODS = (2.0, 20000.0)  # s
 SPANS = {side: f"wander_{side}_span" for side in SIDES}
 """The parameters that hold the length of the recording, s, over which a force wanders."""
-SHALLOWEST = {side: f"layers_{side}_top" for side in SIDES}
-DEEPEST = {side: f"layers_{side}_bottom" for side in SIDES}
-"""The parameters that hold the depths, m, between which a force goes with the depth."""
+SHALLOWEST = {side: f"layers_{side}_top" for side in LAYERED_KIND}
+DEEPEST = {side: f"layers_{side}_bottom" for side in LAYERED_KIND}
+"""The parameters that hold the depths, m, between which a force, moment or current goes with the depth."""
 
 Term = Callable[[tuple[ca.SX, ...]], ca.SX]
 
@@ -145,10 +149,9 @@ def _chebyshev(c: Chain, names: tuple[str, ...], x: ca.SX) -> ca.SX:
     return value
 
 
-def _shares(side: Side, names: tuple[str, ...]) -> tuple[Parameter, ...]:
-    limit = {"heave": 5.0, "pitch": 20.0}[side]
+def _shares(side: str, names: tuple[str, ...]) -> tuple[Parameter, ...]:
     return tuple(
-        Parameter(name=name, unit=UNIT[side], lower=-limit, upper=limit, meaning="of Chebyshev's")
+        Parameter(name=name, unit=UNIT[side], lower=-MOST[side], upper=MOST[side], meaning="of Chebyshev's")
         for name in names
     )
 
@@ -177,8 +180,8 @@ def _wandering(side: Side) -> Effect:
     )
 
 
-def _in_layers(side: Side) -> Effect:
-    names = tuple(f"layers_{side}_{k}" for k in range(1, DEGREE + 1))
+def _in_layers(side: str) -> Effect:
+    names = tuple(f"layers_{side}_{k}" for k in range(1, LAYERS + 1))
     top, bottom = SHALLOWEST[side], DEEPEST[side]
 
     def force(c: Chain) -> None:
@@ -186,17 +189,17 @@ def _in_layers(side: Side) -> Effect:
         setattr(c, side, getattr(c, side) + _chebyshev(c, names, x))
 
     return Effect(
-        name=f"unknown_{KIND[side]}_in_layers",
-        slot=side,
+        name=f"unknown_{LAYERED_KIND[side]}_in_layers",
+        slot=SLOT[side],
         parameters=(
             *_shares(side, names),
             Parameter(name=top, unit="m", lower=-100.0, upper=12000.0, meaning="least depth"),
             Parameter(name=bottom, unit="m", lower=-100.0, upper=12000.0, meaning="greatest depth"),
         ),
-        sentence=f"A {KIND[side]} acts that goes with the depth, as in water that lies or moves in layers.",
+        sentence=f"A {LAYERED_KIND[side]} acts that goes with the depth, as in layered water.",
         equation=f"{RATE[side]} = ... + sum of layers_{side}_k T_k(2 (zeta - {top})/({bottom} - {top}) - 1)",
         manoeuvre="a slow dive through all depths and back with the planes level",
-        probes=((*((0.0,) * DEGREE), 0.0, 1.0),),
+        probes=((*((0.0,) * LAYERS), 0.0, 1.0),),
         sizes=names,
         force=force,
     )
@@ -227,7 +230,7 @@ AS_OF_PLANE = {
 WANDERING = frozenset(f"unknown_wandering_{kind}" for kind in KIND.values())
 """Of so many terms in time that any slow motion can be followed with them."""
 
-IN_LAYERS = tuple(_in_layers(side) for side in SIDES)
+IN_LAYERS = tuple(_in_layers(side) for side in LAYERED_KIND)
 """Asked only of a vehicle that dives: over less, anything goes with the depth."""
 
 FORMS: tuple[Effect, ...] = (

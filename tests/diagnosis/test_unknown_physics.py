@@ -8,7 +8,7 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import BY_NAME, UNKNOWN, named, structure_of
-from host.catalogue.unknown import AS_OF_PLANE, DEGREE, FORMS, IN_LAYERS
+from host.catalogue.unknown import AS_OF_PLANE, FORMS, IN_LAYERS, LAYERS
 from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.fits.fitter import Fitter
@@ -78,7 +78,7 @@ def test_water_in_layers_shows_as_a_force_that_goes_with_the_depth() -> None:
     assert max(gains, key=lambda name: gains[name]) == "unknown_force_in_layers"
     found = fitter.grown(fitter.root, "unknown_force_in_layers", [])
     assert fitter.excess(found.fit) < 1.5
-    assert fitter.free_parameters(found.names) - fitter.free_parameters(fitter.root.names) == DEGREE
+    assert fitter.free_parameters(found.names) - fitter.free_parameters(fitter.root.names) == LAYERS
 
 
 def test_a_vehicle_that_hardly_dives_is_not_asked_for_layers() -> None:
@@ -159,7 +159,7 @@ def test_forms_are_described_and_are_no_entries(form: Effect) -> None:
     assert form.name not in BY_NAME
     assert named(form.name) is form is UNKNOWN[form.name]
     assert form.sentence.endswith(".")
-    assert form.equation.startswith(("w' =", "q' ="))
+    assert form.equation.startswith(("w' =", "q' =", "zeta' ="))
 
 
 def test_what_acts_at_the_plane_in_one_equation_has_a_form_in_both() -> None:

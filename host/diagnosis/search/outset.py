@@ -17,7 +17,7 @@ from host.catalogue import ALONG_THE_HULL, DRIVE, FAINT, NEAR_THE_SURFACE, ORDIN
 from host.catalogue.kin import OFFSETS
 from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
-from host.catalogue.unknown import WANDERING
+from host.catalogue.unknown import IN_LAYERS, WANDERING
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import ROUGHLY, Fitter
 from host.diagnosis.fits.margins import LITTLE, MUCH, margin
@@ -50,6 +50,9 @@ IN_TIME = ("surface_waves", "internal_wave", "unknown_swinging_moment", *sorted(
 """What swings with one period, or wanders. Of a sea it follows a part: little must be left beside it."""
 
 
+LAYERS = frozenset(form.name for form in IN_LAYERS)
+
+
 def at_the_outset(fitter: Fitter) -> Explanation | None:
     """The root with all that every vehicle has, where the root leaves much; None where it does not."""
     if fitter.excess(fitter.root.fit) < MUCH:
@@ -68,16 +71,24 @@ def at_the_outset(fitter: Fitter) -> Explanation | None:
 def beside_what_leads(fitter: Fitter, best: Explanation, jobs: int = 1) -> Explanation:
     """The same beside what changes at a moment, goes with time or keeps the plane back, if that leaves less.
 
-    Where it leads nowhere; where it leaves much, beside the latter two.
+    Or, if it promises most, goes with the depth. Where it leads nowhere; where it leaves much, all these but
+    what changes.
     """
     if fitter.excess(best.fit) > LOST:
-        led = _beside_what_leads(fitter, best, (*SCANS, *DRIVE, *IN_TIME), jobs)
+        led = _beside_what_leads(fitter, best, (*SCANS, *DRIVE, *IN_TIME, *_layers(fitter, best)), jobs)
         return min([best, *led], key=lambda e: e.bic)
     best = min(best, _by_fewer(fitter, fitter.root, best, jobs), key=lambda e: e.bic)
     if fitter.excess(best.fit) > MUCH:
-        led = _beside_what_leads(fitter, best, (*DRIVE, *IN_TIME), jobs)
+        led = _beside_what_leads(fitter, best, (*DRIVE, *IN_TIME, *_layers(fitter, best)), jobs)
         best = min([best, *led], key=lambda e: e.bic)
     return best
+
+
+def _layers(fitter: Fitter, whole: Explanation) -> list[str]:
+    """The form that goes with the depth, if of all forms it promises most."""
+    gains = form_gains(fitter, whole)
+    leading = max(gains, key=lambda name: gains[name])
+    return [leading] if leading in LAYERS and gains[leading] > margin(whole) else []
 
 
 def _as_a_part_tells(fitter: Fitter, names: Names) -> Explanation | None:
