@@ -8,6 +8,7 @@ from hidden_dive import BASE, Extra, hidden_dive
 
 from host.catalogue import ORDINARY, structure_of
 from host.diagnosis.diagnose import _judge, _unnamed, diagnose
+from host.diagnosis.disturbances import plain_waves as plain_waves_module
 from host.diagnosis.disturbances.plain_waves import _beside_hull, _follow_the_plane, _linear_in, plain_waves
 from host.diagnosis.disturbances.seas import (
     Explained,
@@ -146,15 +147,23 @@ def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> Non
     gain = fitter.root.bic - fitter.linear.bic
     assert gain > 1000.0
 
-    def follow(bic: float) -> bool:
-        return _follow_the_plane(fitter, sea, replace(sea, bic=bic))
+    def follow(bic: float, *, band: float = 1.0) -> bool:
+        waves = replace(sea.fit, waves=np.array([1.0, band, 0.0, 0.0, 0.0]))
+        return _follow_the_plane(fitter, sea, replace(sea, bic=bic, fit=waves))
 
-    monkeypatch.setattr("host.diagnosis.disturbances.plain_waves.PARTLY", np.inf)
+    monkeypatch.setattr(plain_waves_module, "PARTLY", np.inf)
     assert follow(fitter.linear.bic)
     assert not follow(fitter.linear.bic - gain)  # twice as much
     monkeypatch.undo()
-    monkeypatch.setattr("host.diagnosis.disturbances.plain_waves.MOSTLY", np.inf)
+    monkeypatch.setattr(plain_waves_module, "MOSTLY", np.inf)
     assert follow(sea.bic - 20.0)  # among white forces a linear hull explains more than that
+    hull = _linear_in(fitter, sea)
+    for among, is_answered in ((hull.bic - 50.0, True), (hull.bic - 200.0, False), (hull.bic + 1.0, False)):
+        # What follows the plane in a narrow band may be what an autopilot answers.
+        end = replace(sea, bic=among)
+        monkeypatch.setattr(plain_waves_module, "with_waves", lambda *_, end=end: end)
+        assert follow(hull.bic - 100.0, band=0.1) != is_answered
+        assert follow(hull.bic - 100.0, band=0.3)
     assert not follow(sea.bic - 100.0 * gain)
     monkeypatch.undo()
     rough = Fitter([hidden_dive(in_waves(lambda *_: (0.0, 0.0, 0.0), 0.02, 0.06), duration=60.0)])
@@ -163,12 +172,12 @@ def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> Non
     sea = with_sea(rough, rough.root)
     hull = _linear_in(rough, sea)
     assert not _follow_the_plane(rough, sea, waves)
-    monkeypatch.setattr("host.diagnosis.disturbances.plain_waves._follow_the_plane", lambda *_: True)
+    monkeypatch.setattr(plain_waves_module, "_follow_the_plane", lambda *_: True)
     gain = hull.bic - with_waves(rough, hull).bic
     assert gain > 100.0
     assert _beside_hull(rough, hull, 0.9 * gain) is not None  # true waves gain more beside a hull
     assert _beside_hull(rough, hull, 1.1 * gain) is None
-    monkeypatch.setattr("host.diagnosis.disturbances.plain_waves.NARROW", 0.02)
+    monkeypatch.setattr(plain_waves_module, "NARROW", 0.02)
     assert plain_waves(rough) is None
 
 

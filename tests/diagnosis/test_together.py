@@ -217,9 +217,9 @@ def test_what_led_nowhere_beside_less_is_not_tried_beside_more(monkeypatch: pyte
     assert completed(search, best) is best  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("left", "is_led"), [(MUCH - 0.1, True), (MUCH + 0.1, False)])
+@pytest.mark.parametrize("left", [MUCH - 0.1, MUCH + 0.1, module.FAR_TOO_MUCH + 1.0])
 def test_a_continuation_goes_through_an_excerpt_of_which_it_leaves_little(
-    left: float, is_led: bool, monkeypatch: pytest.MonkeyPatch
+    left: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Part:
         def __init__(self, recordings: list[Any]) -> None:
@@ -228,19 +228,19 @@ def test_a_continuation_goes_through_an_excerpt_of_which_it_leaves_little(
         def excess(self, fit: float) -> float:
             return fit
 
-    found, whole = SimpleNamespace(fit=left), SimpleNamespace()
+    found = SimpleNamespace(fit=left)
     search: Any = SimpleNamespace(
-        fitter=SimpleNamespace(recordings=["all"], wander=np.zeros(0), refitted=lambda one: (one, whole)),
+        fitter=SimpleNamespace(recordings=["all"], wander=np.zeros(0), refitted=lambda _: "from the excerpt"),
         workers=SimpleNamespace(jobs=1),
         elsewhere=lambda fitter, _: fitter.recordings,
     )
     monkeypatch.setattr(module, "Fitter", Part)
     monkeypatch.setattr(module, "led_excerpt", lambda _: ["piece"])
-    monkeypatch.setattr(module, "continued", lambda runs, *_: found if runs == ["piece"] else None)
-    end: Any = module._continued_through_a_part(search, frozenset(), {})
-    assert end == ((found, whole) if is_led else None)
+    monkeypatch.setattr(module, "continued", lambda runs, *_: found if runs == ["piece"] else "over all")
+    end: Any = module._led_by_the_measurements(search, frozenset(), {})
+    assert end == ("from the excerpt" if left < MUCH else "over all" if left < 100.0 else None)
     monkeypatch.setattr(module, "led_excerpt", lambda runs: runs)
-    assert module._continued_through_a_part(search, frozenset(), {}) is None
+    assert module._led_by_the_measurements(search, frozenset(), {}) == "over all"
 
 
 def test_a_continuation_holds_what_keeps_the_plane_back_from_the_start(
@@ -250,18 +250,17 @@ def test_a_continuation_holds_what_keeps_the_plane_back_from_the_start(
     values = np.arange(1.0, len(structure.names) + 1.0)
     fit = SimpleNamespace(structure=structure, parameters=values)
     asked: list[Any] = []
-    monkeypatch.setattr(module, "continued", lambda *told: asked.append(told[1:]))
-    monkeypatch.setattr(module, "_continued_through_a_part", lambda *told: asked.append(told[1:2]))
+    monkeypatch.setattr(module, "_led_by_the_measurements", lambda *told: asked.append(told[1:]))
     search: Any = SimpleNamespace(
         on_progress=lambda _: None,
         fitter=SimpleNamespace(tools_beside=lambda _: ()),
         fault_of_the_drive=SimpleNamespace(names=frozenset(structure.effect_names), fit=fit),
     )
     assert module._by_continuation(search) is None
-    (of_the_part,), (of_all, _, known) = asked
-    assert of_the_part == of_all == {*ORDINARY, "free_trim", "actuator_rate_limit"}
+    ((names, known),) = asked
+    assert names == {*ORDINARY, "free_trim", "actuator_rate_limit"}
     assert known == {"plane_rate": values[structure.names.index("plane_rate")]}
     asked.clear()
     search.fault_of_the_drive = None
     assert module._by_continuation(search) is None
-    assert asked[1][0] == {*ORDINARY, "free_trim"}
+    assert asked[0][0] == {*ORDINARY, "free_trim"}

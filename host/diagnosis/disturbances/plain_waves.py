@@ -55,10 +55,13 @@ def whole_in_waves(fitter: Fitter, waves: Explanation, whole: Explanation) -> Ex
 def _follow_the_plane(fitter: Fitter, sea: Explanation, waves: Explanation) -> bool:
     """Whether what passes for waves is mostly what the plane does to any hull, or in part to one in a sea.
 
-    Of a hull that is unstable only a filter tells that: no free run follows its linear part alone.
+    Of a hull that is unstable only a filter tells that: no free run follows its linear part alone. A plane
+    that follows narrow waves, as an autopilot's does, tells of these, too: among them the hull gains nothing.
     """
-    if sea.bic - _linear_in(fitter, sea).bic > PARTLY * (sea.bic - waves.bic):
-        return True
+    hull = _linear_in(fitter, sea)
+    if sea.bic - hull.bic > PARTLY * (sea.bic - waves.bic):
+        is_broad = waves.fit.waves[1] > NARROW
+        return is_broad or not waves.bic < with_waves(fitter, hull).bic < hull.bic - NAMING_MARGIN
     return _does_a_linear_hull(fitter, as_filtered(fitter, fitter.root).bic - waves.bic)
 
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from host.diagnosis.search.search import Search
 
 MOST_BESIDE = 3  # effects beside those that every vehicle has
+FAR_TOO_MUCH = 100.0  # times the noise floor, of an excerpt: of all, ends were found a third as far away
 HARDLY_LESS = 0.95  # of what is left over the noise floor: another effect beside so many leads nowhere
 
 
@@ -169,8 +170,7 @@ def _by_continuation(search: "Search") -> Explanation | None:
     faults, known = _faults_of_the_drive(search)
     names = frozenset({*ORDINARY, FREE_TRIM.name, *faults})
     names |= {*search.fitter.tools_beside(names)}
-    found = _continued_through_a_part(search, names, known)
-    found = found or continued(search, names, MOST_BESIDE, known)
+    found = _led_by_the_measurements(search, names, known)
     if found is None:
         return None
     end = search.remember(search.fitter.polished(found))
@@ -188,19 +188,24 @@ def _faults_of_the_drive(search: "Search") -> tuple[Names, dict[str, float]]:
     return names, {name: value for name, value in pairs if name in own}
 
 
-def _continued_through_a_part(
+def _led_by_the_measurements(
     search: "Search", names: Names, known: Mapping[str, float]
 ) -> Explanation | None:
-    """The same through an excerpt, and from there on all; None where much is left of the excerpt."""
+    """The set by continuation through an excerpt, and from there on all; over all where it leaves much of it.
+
+    Where it leaves far too much of short pieces, it leads nowhere over all, which takes longest.
+    """
     pieces = led_excerpt(search.fitter.recordings)
-    if pieces is search.fitter.recordings or search.fitter.wander.any():
-        return None
-    fitter = Fitter(pieces)
-    with Workers(fitter, search.workers.jobs) as workers:
-        found = continued(search.elsewhere(fitter, workers), names, MOST_BESIDE, known)
-    if found is None or fitter.excess(found.fit) > MUCH:
-        return None
-    return search.fitter.refitted(found)
+    if pieces is not search.fitter.recordings and not search.fitter.wander.any():
+        fitter = Fitter(pieces)
+        with Workers(fitter, search.workers.jobs) as workers:
+            found = continued(search.elsewhere(fitter, workers), names, MOST_BESIDE, known)
+        left = inf if found is None else fitter.excess(found.fit)
+        if found is not None and left < MUCH:
+            return search.fitter.refitted(found)
+        if FAR_TOO_MUCH < left < inf:
+            return None
+    return continued(search, names, MOST_BESIDE, known)
 
 
 def _more(search: "Search", best: Explanation) -> list[Task]:
