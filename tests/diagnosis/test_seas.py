@@ -177,6 +177,10 @@ def test_water_does_not_follow_the_plane(monkeypatch: pytest.MonkeyPatch) -> Non
     assert gain > 100.0
     assert _beside_hull(rough, hull, 0.9 * gain) is not None  # true waves gain more beside a hull
     assert _beside_hull(rough, hull, 1.1 * gain) is None
+    # What a linear hull does without forces, for waves as narrow as these it does not make up.
+    monkeypatch.setattr(plain_waves_module, "_does_a_linear_hull", lambda *_: True)
+    monkeypatch.setattr(plain_waves_module, "_beside_hull", lambda *_: waves)
+    assert plain_waves(rough) is not None
     monkeypatch.setattr(plain_waves_module, "NARROW", 0.02)
     assert plain_waves(rough) is None
 

@@ -17,19 +17,20 @@ def plain_waves(fitter: Fitter) -> Explanation | None:
     """The root among waves, where these are plain to see: likelier than white forces, and than none.
 
     Beside the root alone, unless the water would have to follow the plane; or beside a linear hull, of which
-    a slow plane or an autopilot hides them.
+    a slow plane or an autopilot hides them. What such a hull does without forces is asked of broad ones.
     """
     root = fitter.root
     if fitter.excess(root.fit) < LITTLE:
         return None
     sea, calm = with_sea(fitter, root), as_filtered(fitter, root).bic
-    least, gain = min(sea.bic, calm), NAMING_MARGIN
+    least, gain, is_narrow = min(sea.bic, calm), NAMING_MARGIN, False
     if roughly_with_waves(fitter, sea).bic < least - NAMING_MARGIN:
         waves = with_waves(fitter, sea)
         if is_sea(waves.fit) and not _follow_the_plane(fitter, sea, waves):
             return waves
         gain = least - waves.bic
-    if sea.bic > calm - NAMING_MARGIN or _does_a_linear_hull(fitter, calm - sea.bic):
+        is_narrow = is_sea(waves.fit) and waves.fit.waves[1] < NARROW
+    if sea.bic > calm - NAMING_MARGIN or (not is_narrow and _does_a_linear_hull(fitter, calm - sea.bic)):
         return None
     beside = _beside_hull(fitter, _linear_in(fitter, sea), gain)
     return None if beside is None else with_waves(fitter, sea, beside.fit)
