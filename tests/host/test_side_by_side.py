@@ -39,6 +39,21 @@ def test_work_within_work_is_done_where_it_is() -> None:
     assert found == [[(k, 0), (k, 1)] for k in range(3)]
 
 
+def test_work_within_work_does_not_wait_for_a_helper_that_is_busy() -> None:
+    main, done = threading.current_thread(), threading.Event()
+
+    def outer(_: int) -> list[int]:
+        if threading.current_thread() is main:
+            found = side_by_side(lambda k: k, [0, 1, 2])
+            done.set()
+            return found
+        assert done.wait(10.0)  # it goes on only once the main thread has what is within
+        return []
+
+    with on_cores(2):
+        assert [0, 1, 2] in side_by_side(outer, [0, 1])
+
+
 def test_an_error_reaches_the_caller_and_numpy_is_told_the_same() -> None:
     with on_cores(2), np.errstate(divide="raise"), pytest.raises(FloatingPointError):
         side_by_side(lambda zero: np.ones(1) / zero, [np.zeros(1)] * 8)
