@@ -73,6 +73,12 @@ def test_what_an_effect_would_explain_is_not_apart(monkeypatch: pytest.MonkeyPat
     assert stretches_apart(short) == ([], short.whole)
     monkeypatch.setattr(apart, "form_gains", lambda *_: {"unknown_force_w_w": np.inf})
     assert stretches_apart(short) == ([], None)
+    # Of what goes with the depth the catalogue may hold an effect, which is asked first.
+    layered = {"unknown_force_w_w": 0.0, "unknown_force_in_layers": np.inf}
+    monkeypatch.setattr(apart, "form_gains", lambda *_: layered)
+    assert stretches_apart(short) == ([], short.whole)
+    monkeypatch.setattr(apart, "_with_an_effect", lambda *_: None)
+    assert stretches_apart(short) == ([], None)
 
 
 def test_short_recordings_several_and_alarms_are_taken_whole() -> None:

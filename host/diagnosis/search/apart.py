@@ -18,7 +18,7 @@ from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LITTLE
 from host.diagnosis.fits.prospects import form_gains
 from host.diagnosis.fits.workers import Workers
-from host.diagnosis.search.outset import IN_TIME, says_all
+from host.diagnosis.search.outset import IN_TIME, LAYERS, says_all
 from host.diagnosis.search.short_runs import ShortRuns, best_of_all
 from host.likelihood.output_error import output_error
 from host.recordings.left_out import Span
@@ -71,10 +71,16 @@ def stretches_apart(short: ShortRuns, jobs: int = 1) -> Apart:
         return NOTHING
     least = SHARE * _less(short.whole, taught.whole)
     forms = form_gains(short.fitter, short.whole)
-    if max(worth for name, worth in forms.items() if name not in IN_TIME) > least:
+    if _most_of(forms, beside={*IN_TIME, *LAYERS}) > least:
         return NOTHING
     instead = _with_an_effect(short.fitter, short.whole, least, jobs)
-    return Apart(apart) if instead is None else Apart([], instead)
+    if instead is not None:  # of the catalogue, too, something goes with the depth
+        return Apart([], instead)
+    return NOTHING if _most_of(forms, beside={*IN_TIME}) > least else Apart(apart)
+
+
+def _most_of(forms: dict[str, float], beside: set[str]) -> float:
+    return max(worth for name, worth in forms.items() if name not in beside)
 
 
 def _without_the_worst(fitter: Fitter, whole: Explanation) -> _Taught | None:
