@@ -58,6 +58,10 @@ def swell(time: float, x: Array, plane: float) -> tuple[float, float, float]:  #
     return 0.0, 0.0, 0.3 * np.sin(2.0 * np.pi * time / 20.0)
 
 
+def layer(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+    return 0.15 / np.cosh((x[3] - 24.0) / 3.0) ** 2, 0.0, 0.0
+
+
 def led_at_the_outset(fitter: Fitter) -> Explanation | None:
     whole = at_the_outset(fitter)
     return None if whole is None else beside_what_leads(fitter, whole)
@@ -227,9 +231,26 @@ def test_where_it_leads_nowhere_something_may_have_changed(monkeypatch: pytest.M
     assert found.leaves_white
     assert leads_on(fitter, found)
     monkeypatch.setattr(outset, "_beside_what_leads", lambda *_: [])
+    monkeypatch.setattr(outset, "_layers", lambda *_: [])
     nowhere = led_at_the_outset(fitter)
     assert nowhere is not None
     assert not leads_on(fitter, nowhere)
+
+
+def test_what_goes_with_the_depth_joins_where_it_promises_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    fitter = Fitter([hidden_dive(layer, duration=100.0)])
+    whole = at_the_outset(fitter)
+    assert whole is not None
+    assert outset._layers(fitter, whole) == sorted(outset.LAYERS)
+    found = led_at_the_outset(fitter)
+    assert found is not None
+    assert "unknown_force_in_layers" in found.names
+    assert leads_on(fitter, found)
+    search: Any = SimpleNamespace(fitter=fitter)
+    monkeypatch.setattr(outset, "with_sea", None)  # no forces are to stand for it
+    assert outset.pushed_by_forces(search, found) is None
+    monkeypatch.setattr(outset, "form_gains", lambda *_: dict.fromkeys(outset.LAYERS, 50.0) | {"other": 51.0})
+    assert outset._layers(fitter, whole) == []
 
 
 def test_where_it_leads_nowhere_water_may_swing() -> None:

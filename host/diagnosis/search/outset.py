@@ -71,24 +71,36 @@ def at_the_outset(fitter: Fitter) -> Explanation | None:
 def beside_what_leads(fitter: Fitter, best: Explanation, jobs: int = 1) -> Explanation:
     """The same beside what changes at a moment, goes with time or keeps the plane back, if that leaves less.
 
-    Or, if it promises most, goes with the depth. Where it leads nowhere; where it leaves much, all these but
-    what changes.
+    Or, if that promises most, goes with the depth. Where it leads nowhere; where it leaves much, beside all
+    these but what changes.
     """
     if fitter.excess(best.fit) > LOST:
-        led = _beside_what_leads(fitter, best, (*SCANS, *DRIVE, *IN_TIME, *_layers(fitter, best)), jobs)
+        layers = _layers(fitter, best)
+        led = _beside_what_leads(fitter, best, (*SCANS, *DRIVE, *IN_TIME, *layers), jobs)
+        led += _joined_by(fitter, best, layers, jobs)
         return min([best, *led], key=lambda e: e.bic)
     best = min(best, _by_fewer(fitter, fitter.root, best, jobs), key=lambda e: e.bic)
     if fitter.excess(best.fit) > MUCH:
-        led = _beside_what_leads(fitter, best, (*DRIVE, *IN_TIME, *_layers(fitter, best)), jobs)
+        layers = _layers(fitter, best)
+        led = _beside_what_leads(fitter, best, (*DRIVE, *IN_TIME, *layers), jobs)
+        led += _joined_by(fitter, best, layers, jobs)
         best = min([best, *led], key=lambda e: e.bic)
     return best
 
 
 def _layers(fitter: Fitter, whole: Explanation) -> list[str]:
-    """The form that goes with the depth, if of all forms it promises most."""
+    """The forms that go with the depth, if one of them promises most of all forms."""
     gains = form_gains(fitter, whole)
     leading = max(gains, key=lambda name: gains[name])
-    return [leading] if leading in LAYERS and gains[leading] > margin(whole) else []
+    return sorted(LAYERS) if leading in LAYERS and gains[leading] > margin(whole) else []
+
+
+def _joined_by(fitter: Fitter, whole: Explanation, names: list[str], jobs: int) -> list[Explanation]:
+    """The same with one of these, where that leaves less than half."""
+    with Workers(fitter, jobs) as workers:
+        joined = workers.results([(Fitter.grown, (whole, name, [])) for name in names])
+        joined = workers.results([(Fitter.polished, (one,)) for one in joined])
+    return [one for one in joined if fitter.excess(one.fit) < HALF * fitter.excess(whole.fit)]
 
 
 def _as_a_part_tells(fitter: Fitter, names: Names) -> Explanation | None:
@@ -174,7 +186,8 @@ def pushed_by_forces(search: "Search", whole: Explanation) -> Explanation | None
     beside a change or a fault of the plane's drive may be another of these.
     """
     fitter = search.fitter
-    if not LITTLE < fitter.excess(whole.fit) < LOST or whole.names & {*SCANS, *DRIVE, *IN_TIME}:
+    is_described = bool(whole.names & {*SCANS, *DRIVE, *IN_TIME, *LAYERS})
+    if is_described or not LITTLE < fitter.excess(whole.fit) < LOST:
         return None
     sea = with_sea(fitter, whole)
     explained = as_filtered(fitter, whole).bic - sea.bic
