@@ -107,16 +107,20 @@ def test_of_a_long_recording_some_pieces_teach_and_all_are_judged(monkeypatch: p
 @pytest.mark.parametrize(
     ("spans", "is_for_good"),
     [
-        ([(0.0, 50.0), (225.0, 250.0)], False),
+        ([(25.0, 75.0), (225.0, 250.0)], False),
+        ([(25.0, 50.0), (225.0, 250.0)], False),
+        ([(0.0, 25.0), (225.0, 250.0)], False),
         ([(0.0, 25.0), (200.0, 250.0)], True),
+        ([(0.0, 75.0)], True),
+        ([(0.0, 75.0), (100.0, 125.0)], True),
         ([(225.0, 250.0)], True),
         ([(200.0, 225.0)], False),
     ],
 )
-def test_what_lasts_until_the_end_is_for_good_unless_as_much_came_before(
+def test_what_lasts_until_the_end_or_from_the_start_is_for_good_unless_something_else_did(
     spans: list[tuple[float, float]], is_for_good: bool
 ) -> None:
-    assert apart._is_for_good(spans, hidden_dive(duration=250.0)) == is_for_good
+    assert apart._is_for_good(spans, [hidden_dive(duration=250.0)]) == is_for_good
 
 
 @pytest.mark.long

@@ -57,9 +57,9 @@ NOTHING = Apart([])
 def stretches_apart(short: ShortRuns, jobs: int = 1) -> Apart:
     """The stretches of one recording without which all that every vehicle has leaves white noise.
 
-    None where they are many. What lasts until the end is one of them if something before lasted as long: what
-    changed and never comes back is in the catalogue. Of a long recording some pieces teach what every vehicle
-    has, and the others are held against that.
+    None where they are many. What lasts until the end, or from the start, is one of them if something else
+    lasted as long: what changed and never comes back is in the catalogue. Of a long recording some pieces
+    teach what every vehicle has, and the others are held against that.
     """
     pieces = short.pieces
     if (taught := _without_the_worst(short.fitter, short.whole)) is None:
@@ -67,7 +67,7 @@ def stretches_apart(short: ShortRuns, jobs: int = 1) -> Apart:
     kept = taught.pieces if short.are_all_fitted else _followed(pieces, taught)
     starts = {piece.time[0] for piece in kept}
     apart = _joined([piece for piece in pieces if piece.time[0] not in starts])
-    if not apart or len(kept) < (1.0 - MOST) * len(pieces) or _is_for_good(apart, pieces[-1]):
+    if not apart or len(kept) < (1.0 - MOST) * len(pieces) or _is_for_good(apart, pieces):
         return NOTHING
     least = SHARE * _less(short.whole, taught.whole)
     forms = form_gains(short.fitter, short.whole)
@@ -138,11 +138,15 @@ def _most(left: Array) -> float:
     return WORSE * max(float(np.median(left)), 1.0)
 
 
-def _is_for_good(apart: list[Span], last: Recording) -> bool:
-    """Whether the last of these stretches lasts until the end, and longer than any before it."""
-    *earlier, (start, end) = apart
-    lasts = end > last.time[-1]
-    return lasts and all(end - start > until - since + last.step for since, until in earlier)
+def _is_for_good(apart: list[Span], pieces: list[Recording]) -> bool:
+    """Whether the longest of these stretches alone is so long, and begins or ends with the recording.
+
+    What changed before it ends, or after it began, never comes back.
+    """
+    start, end = max(apart, key=lambda span: span[1] - span[0])
+    at_an_end = start <= pieces[0].time[0] or end > pieces[-1].time[-1]
+    others = [span for span in apart if span != (start, end)]
+    return at_an_end and all(end - start > until - since + pieces[0].step for since, until in others)
 
 
 def _with_an_effect(fitter: Fitter, bent: Explanation, least: float, jobs: int) -> Explanation | None:
