@@ -4,14 +4,16 @@ None of these is an answer. Where one of them does better than the named effects
 is at work that the catalogue does not hold, however well some of its entries may imitate it together.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import combinations_with_replacement
 from typing import Literal
 
 import casadi as ca
+import numpy as np
 
 from host.catalogue.oscillation import oscillation, oscillation_parameters
 from host.dynamics.equations import Chain, Effect, Parameter, Slot
+from host.recordings.recording import Array
 
 Side = Literal["heave", "pitch"]
 SIDES: tuple[Side, Side] = ("heave", "pitch")
@@ -229,6 +231,16 @@ AS_OF_PLANE = {
 
 WANDERING = frozenset(f"unknown_wandering_{kind}" for kind in KIND.values())
 """Of so many terms in time that any slow motion can be followed with them."""
+
+
+def over_depth(name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
+    """Depths, m, and what a form in layers makes of them, by the values of its parameters (100,) each."""
+    form = next(one for one in IN_LAYERS if one.name == name)
+    *shares, top, bottom = (values[parameter.name] for parameter in form.parameters)
+    x = np.linspace(-1.0, 1.0, 100)
+    sizes = np.asarray(np.polynomial.chebyshev.chebval(x, [0.0, *shares]), dtype=float)
+    return top + (bottom - top) * (x + 1.0) / 2.0, sizes
+
 
 IN_LAYERS = tuple(_in_layers(side) for side in LAYERED_KIND)
 """Asked only of a vehicle that dives: over less, anything goes with the depth."""

@@ -1,5 +1,6 @@
 """Physics that no entry of the catalogue is must not pass for some of its entries."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import BY_NAME, UNKNOWN, named, structure_of
-from host.catalogue.unknown import AS_OF_PLANE, FORMS, IN_LAYERS, LAYERS
+from host.catalogue.unknown import AS_OF_PLANE, FORMS, IN_LAYERS, LAYERS, over_depth
 from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.fits.fitter import Fitter
@@ -18,6 +19,7 @@ from host.diagnosis.fits.workers import Workers
 from host.diagnosis.search import beam
 from host.diagnosis.search.lone_form import likely_forms, lone_form
 from host.diagnosis.search.search import Search
+from host.diagnosis.search.unknown_physics import unknown_in
 from host.diagnosis.told.files import write_extended_model
 from host.diagnosis.told.report import summary
 from host.dynamics.equations import Effect
@@ -79,6 +81,18 @@ def test_water_in_layers_shows_as_a_force_that_goes_with_the_depth() -> None:
     found = fitter.grown(fitter.root, "unknown_force_in_layers", [])
     assert fitter.excess(found.fit) < 1.5
     assert fitter.free_parameters(found.names) - fitter.free_parameters(fitter.root.names) == LAYERS
+
+
+def test_a_form_in_layers_is_told_by_its_depths() -> None:
+    fitter = Fitter([hidden_dive(layer, duration=100.0)])
+    found = fitter.polished(fitter.grown(fitter.root, "unknown_force_in_layers", []))
+    values = dict(zip(found.fit.structure.names, found.fit.parameters.tolist(), strict=True))
+    depths, sizes = over_depth("unknown_force_in_layers", values)
+    true = 0.15 / np.cosh((depths - 24.0) / 3.0) ** 2
+    inside = (depths > 20.0) & (depths < 29.0)
+    assert np.std((sizes - true)[inside]) < 0.1 * np.std(true[inside])
+    (told,) = unknown_in(found)
+    assert re.search(r"to 0\.\d+ at 2[345]\.?\d* m, changing most at \d", told)
 
 
 def test_a_vehicle_that_hardly_dives_is_not_asked_for_layers() -> None:

@@ -6,7 +6,10 @@ explains the recording better, and with it some of them are no longer needed. Fo
 the search found grows further only in competition with these forms.
 """
 
+import numpy as np
+
 from host.catalogue import BY_NAME, UNKNOWN
+from host.catalogue.unknown import IN_LAYERS, over_depth
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.margins import FEW, LARGEST_SET, LITTLE, NAMING_MARGIN, SMALL, margin
 from host.diagnosis.fits.prospects import form_gains
@@ -15,6 +18,7 @@ from host.diagnosis.search.lone_form import FAIR_PART, PROMISING, likely_forms
 from host.diagnosis.search.pruning import pruned
 from host.diagnosis.search.search import Search
 from host.diagnosis.search.together import completed
+from host.dynamics.equations import Effect
 
 MOST_ROUNDS = 8
 MOST_FORMS = 3  # of unknown physics beside many effects: more tell nothing of what acts
@@ -66,8 +70,20 @@ def unknown_in(explanation: Explanation) -> list[str]:
     for form in (UNKNOWN[name] for name in _forms_in(explanation)):
         listed = [f"{p.name} = {values[p.name]:.3g} {p.unit}" for p in form.parameters]
         told = f"; {', '.join(listed)}" if len(listed) <= MOST_TOLD else ""
+        told += _over_depth(form, values) if form in IN_LAYERS else ""
         said.append(f"{form.sentence[:-1]} ({form.equation}{told}).")
     return said
+
+
+def _over_depth(form: Effect, values: dict[str, float]) -> str:
+    """Between what a form in layers goes, and at which depths: but for a constant, which others tell."""
+    depths, sizes = over_depth(form.name, values)
+    least, most = int(np.argmin(sizes)), int(np.argmax(sizes))
+    unit = form.parameters[0].unit
+    return (
+        f"; from {sizes[least]:.3g} {unit} at {depths[least]:.3g} m to {sizes[most]:.3g} at "
+        f"{depths[most]:.3g} m, changing most at {depths[np.argmax(np.abs(np.diff(sizes)))]:.3g} m"
+    )
 
 
 def without_unknown(search: Search, best: Explanation) -> Explanation:
