@@ -25,7 +25,7 @@ from host.diagnosis.proof.slight import is_slight
 from host.diagnosis.proof.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.proof.verdict import Verdict, remaining, verdict_on
 from host.diagnosis.recordings.sensed import as_sensed
-from host.diagnosis.recordings.spans import Spans, divide, excerpt
+from host.diagnosis.recordings.spans import Spans, clear_of, divide, excerpt
 from host.diagnosis.recordings.usable import check_usable, noted, with_plane_told
 from host.diagnosis.search.candidates import eligible
 from host.diagnosis.search.exchange import twins
@@ -240,6 +240,9 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
     best, search, left, waves, _ = explained
     model = best if waves is None else waves.model
     on_progress("held-out check")
+    fit = best.fit
+    known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
+    spans = clear_of(spans, [known[name] for name in fit.structure.moments])
     horizon = _horizon(left)
     # The very waves that were met are chance, and the regular one in their place may come out of step.
     foretelling = best if waves is None else waves.fitted

@@ -10,7 +10,7 @@ import pytest
 from hidden_dive import hidden_dive
 
 from host.diagnosis.diagnose import Diagnosis, diagnose
-from host.diagnosis.recordings.spans import divide
+from host.diagnosis.recordings.spans import clear_of, divide
 from host.noise.noise_floor import noise_floor
 from tools.cli import main
 
@@ -39,6 +39,22 @@ def test_judging_spans_teach_nothing() -> None:
     (unseen,) = spans.unseen
     np.testing.assert_array_equal(np.isfinite(unseen.depth), judged)
     np.testing.assert_array_equal(unseen.depth[judged], recording.depth[judged])
+
+
+def test_a_stretch_in_which_something_changed_does_not_judge() -> None:
+    spans = divide([hidden_dive(duration=100.0)])
+    first, second = spans.judging
+    inside = float(first.time[3])
+    rest = clear_of(spans, [inside])
+    assert [piece.time[0] for piece in rest.judging] == [second.time[0]]
+    (unseen,) = rest.unseen
+    known = unseen.time[np.isfinite(unseen.depth)]
+    assert known.min() == pytest.approx(second.time[0])
+    assert known.max() == pytest.approx(second.time[-1])
+    assert clear_of(spans, [float(first.time[0]) - 1.0]).judging == spans.judging
+    assert clear_of(spans, [inside, float(second.time[3])]) is spans  # else none would judge
+    several = replace(spans, teaching=[*spans.teaching, replace(spans.teaching[0], name="other.csv")])
+    assert clear_of(several, [inside]) is several
 
 
 @pytest.mark.parametrize(("every", "readings"), [(5, [24, 24]), (10, [])])

@@ -62,6 +62,23 @@ def divide(recordings: list[Recording]) -> Spans:
     return Spans(teaching, judging, unseen if judging else [])
 
 
+def clear_of(spans: Spans, moments: list[float]) -> Spans:
+    """Less the stretches that judge in which one of these moments lies, s, unless none is left.
+
+    What teaches tells that something changed there, but hardly when. Of one vehicle's recordings that are
+    several nothing tells which a moment belongs to.
+    """
+    judging, unseen = [], spans.unseen
+    for piece in spans.judging:
+        start, end = float(piece.time[0]), float(piece.time[-1] + piece.step)
+        if any(start <= moment <= end for moment in moments):
+            unseen = [_blanked(one, start, end) for one in unseen]
+        else:
+            judging.append(piece)
+    is_one = len({recording.name for recording in spans.teaching}) == 1
+    return replace(spans, judging=judging, unseen=unseen) if judging and is_one else spans
+
+
 def excerpt(teaching: list[Recording], like: list[Recording] | None = None) -> list[Recording]:
     """Of long recordings the pieces in which the plane moves most; else all.
 
