@@ -25,7 +25,7 @@ UNIT = {"heave": "m/s^2", "pitch": "rad/s^2", "climb": "m/s"}
 MOST = {"heave": 5.0, "pitch": 20.0, "climb": 5.0}
 MOTION = ("w", "q", "theta", "delta")
 DEGREE = 7  # of what wanders slowly: about as many turns as a tide or a leak takes in one recording
-LAYERS = 11  # the same of what goes with the depth: a layer a quarter as thick as the dive is deep
+LAYERED_DEGREE = 11  # the same of what goes with the depth: a layer a quarter as thick as the dive is deep
 SWING_PERIODS = (2.0, 20000.0)  # s
 SPANS = {side: f"wander_{side}_span" for side in SIDES}
 """The parameters that hold the length of the recording, s, over which a force wanders."""
@@ -183,7 +183,7 @@ def _wandering(side: Side) -> Effect:
 
 
 def _in_layers(side: str) -> Effect:
-    names = tuple(f"layers_{side}_{k}" for k in range(1, LAYERS + 1))
+    names = tuple(f"layers_{side}_{k}" for k in range(1, LAYERED_DEGREE + 1))
     top, bottom = SHALLOWEST[side], DEEPEST[side]
 
     def force(c: Chain) -> None:
@@ -201,7 +201,7 @@ def _in_layers(side: str) -> Effect:
         sentence=f"A {LAYERED_KIND[side]} acts that goes with the depth, as in layered water.",
         equation=f"{RATE[side]} = ... + sum of layers_{side}_k T_k(2 (zeta - {top})/({bottom} - {top}) - 1)",
         manoeuvre="a slow dive through all depths and back with the planes level",
-        probes=((*((0.0,) * LAYERS), 0.0, 1.0),),
+        probes=((*((0.0,) * LAYERED_DEGREE), 0.0, 1.0),),
         sizes=names,
         force=force,
     )
@@ -233,22 +233,23 @@ WANDERING = frozenset(f"unknown_wandering_{kind}" for kind in KIND.values())
 """Of so many terms in time that any slow motion can be followed with them."""
 
 
+_LAYERED = {form.name: form for form in map(_in_layers, LAYERED_KIND)}
+IN_LAYERS = frozenset(_LAYERED)
+"""Asked only of a vehicle that dives: over less, anything goes with the depth."""
+
+
 def over_depth(name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
     """Depths, m, and what a form in layers makes of them, by the values of its parameters (100,) each."""
-    form = next(one for one in IN_LAYERS if one.name == name)
-    *shares, top, bottom = (values[parameter.name] for parameter in form.parameters)
+    *shares, top, bottom = (values[parameter.name] for parameter in _LAYERED[name].parameters)
     x = np.linspace(-1.0, 1.0, 100)
     sizes = np.asarray(np.polynomial.chebyshev.chebval(x, [0.0, *shares]), dtype=float)
     return top + (bottom - top) * (x + 1.0) / 2.0, sizes
 
-
-IN_LAYERS = tuple(_in_layers(side) for side in LAYERED_KIND)
-"""Asked only of a vehicle that dives: over less, anything goes with the depth."""
 
 FORMS: tuple[Effect, ...] = (
     *(_of_motion(side, shape, term) for side in SIDES for shape, term in SHAPES.items()),
     *(_of_plane(shape, term) for shape, term in PLANE_SHAPES.items()),
     *(_wandering(side) for side in SIDES),
     SWINGING_MOMENT,
-    *IN_LAYERS,
+    *_LAYERED.values(),
 )

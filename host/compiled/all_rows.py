@@ -28,7 +28,7 @@ BLOCK = 64  # rows at once where it is compiled, as in all_rows.c
 EFFORTS = (("-O3", "-fopenmp-simd", "-march=native"), ("-O3", "-fopenmp-simd"), ("-O3",))
 
 _OPERATIONS: tuple[tuple[tuple[int, ...], Callable[..., Any]], ...] = (
-    ((ca.OP_ASSIGN, ca.OP_OUTPUT), lambda x, _: x),
+    ((ca.OP_ASSIGN,), lambda x, _: x),
     ((ca.OP_ADD,), np.add),
     ((ca.OP_SUB,), np.subtract),
     ((ca.OP_MUL,), np.multiply),

@@ -7,6 +7,7 @@ computer has a C compiler, else by NumPy, which takes several times longer and d
 import ctypes
 from collections.abc import Callable
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,26 @@ from host.compiled.all_rows import AllRows, Part, library_of
 from host.recordings.recording import Array
 
 WIDE = 8  # numbers that a computer may add at once
+
+
+class Passage(NamedTuple):
+    """A run through N rows, and where its sensitivities begin.
+
+    states   (nx, N) that were seen
+    within   (substeps, nx, N) states from which the sub-steps begin
+    drive    (m, N)
+    start    (nx, columns) S at the first row; the first columns are those of the parameters
+    present  (2, N) 1 where measured, else 0
+    gains    (2 nx, N), column-major nx x 2, by which measurements corrected the state; None in a free run
+    """
+
+    states: Array
+    within: Array
+    parameters: Array
+    drive: Array
+    start: Array
+    present: Array
+    gains: Array | None = None
 
 
 class CarriedSlopes:
@@ -27,29 +48,15 @@ class CarriedSlopes:
     def __init__(self, output: AllRows, substep: AllRows) -> None:
         self._output, self._substep = output, substep
 
-    def __call__(
-        self,
-        states: Array,
-        within: Array,
-        parameters: Array,
-        drive: Array,
-        start: Array,
-        present: Array,
-        gains: Array | None = None,
-    ) -> Array:
-        """dh (2, columns, N), 0 where nothing was measured.
+    def __call__(self, run: Passage) -> Array:
+        """dh (2, columns, N), 0 where nothing was measured."""
+        carry = _compiled()
+        return self._by_numpy(run) if carry is None else self._by_machine(carry, run)
 
-        states   (nx, N) that were seen
-        within   (substeps, nx, N) states from which the sub-steps begin
-        drive    (m, N)
-        start    (nx, columns) S at the first row; the first columns are those of the parameters
-        present  (2, N) 1 where measured, else 0
-        gains    (2 nx, N), column-major nx x 2, by which measurements corrected the state
-        """
-        if (run := _compiled()) is None:
-            return self._by_numpy(states, within, parameters, drive, start, present, gains)
+    def _by_machine(self, carry: Callable[..., None], run: Passage) -> Array:
+        _, within, parameters, drive, start, present, gains = run
         (substeps, nx, rows), columns = within.shape, start.shape[1]
-        output = self._output.part((states, parameters, drive))
+        output = self._output.part((run.states, parameters, drive))
         parts = [
             self._substep.part((begun, parameters, drive, np.array([float(k)])), 1 + k)
             for k, begun in enumerate(within)
@@ -58,7 +65,7 @@ class CarriedSlopes:
         S, room, seen = np.zeros((2, nx, wide)), np.empty((2, wide)), np.empty((2, columns, rows))
         S[0, :, :columns] = start
         kept = [None if each is None else np.ascontiguousarray(each, float) for each in (gains, present)]
-        run(
+        carry(
             rows,
             substeps,
             ctypes.byref(output),
@@ -72,16 +79,8 @@ class CarriedSlopes:
         )
         return seen
 
-    def _by_numpy(
-        self,
-        states: Array,
-        within: Array,
-        parameters: Array,
-        drive: Array,
-        start: Array,
-        present: Array,
-        gains: Array | None,
-    ) -> Array:
+    def _by_numpy(self, run: Passage) -> Array:
+        states, within, parameters, drive, start, present, gains = run
         substeps, nx, rows = within.shape
         hx, hp = self._output(states, parameters, drive)
         number = np.tile(np.arange(float(substeps)), rows)[None]

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from host.compiled.all_rows import AllRows
-from host.compiled.carried_slopes import CarriedSlopes
+from host.compiled.carried_slopes import CarriedSlopes, Passage
 from host.compiled.over_rows import KEPT, over_rows
 from host.dynamics.propagate import Form, Inputs, Run, form_of, free_run, start_of
 from host.dynamics.substep_slopes import substep_slopes
@@ -47,9 +47,9 @@ def sensitivities(
     form = form_of(inputs)
     _, start = start_of(form, parameters, initial, inputs)
     with np.errstate(all="ignore"):  # a run that leaves the numbers is seen by its size
-        carried = _carried(form, inputs.own)
         values = inputs.widened(parameters)
-        return carried(run.states, run.within, values, inputs.drive, start, inputs.present, gains)
+        passage = Passage(run.states, run.within, values, inputs.drive, start, inputs.present, gains)
+        return _carried(form, inputs.own)(passage)
 
 
 def steered_run(parameters: Array, initial: Array, inputs: Inputs, gains: Array) -> Run:

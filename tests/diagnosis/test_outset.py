@@ -12,6 +12,7 @@ from host.catalogue import ALONG_THE_HULL, DRIVE, FAINT, ORDINARY
 from host.catalogue.kin import OFFSETS
 from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
+from host.catalogue.unknown import IN_LAYERS
 from host.diagnosis import plane_choice
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.fits.explanation import Explanation
@@ -241,7 +242,7 @@ def test_what_goes_with_the_depth_joins_where_it_promises_most(monkeypatch: pyte
     fitter = Fitter([hidden_dive(layer, duration=100.0)])
     whole = at_the_outset(fitter)
     assert whole is not None
-    assert outset._layers(fitter, whole) == sorted(outset.LAYERS)
+    assert outset._layers(fitter, whole) == sorted(IN_LAYERS)
     found = led_at_the_outset(fitter)
     assert found is not None
     assert "unknown_force_in_layers" in found.names
@@ -249,7 +250,7 @@ def test_what_goes_with_the_depth_joins_where_it_promises_most(monkeypatch: pyte
     search: Any = SimpleNamespace(fitter=fitter)
     monkeypatch.setattr(outset, "with_sea", None)  # no forces are to stand for it
     assert outset.pushed_by_forces(search, found) is None
-    monkeypatch.setattr(outset, "form_gains", lambda *_: dict.fromkeys(outset.LAYERS, 50.0) | {"other": 51.0})
+    monkeypatch.setattr(outset, "form_gains", lambda *_: dict.fromkeys(IN_LAYERS, 50.0) | {"other": 51.0})
     assert outset._layers(fitter, whole) == []
 
 

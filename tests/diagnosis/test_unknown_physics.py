@@ -9,7 +9,7 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import BY_NAME, UNKNOWN, named, structure_of
-from host.catalogue.unknown import AS_OF_PLANE, FORMS, IN_LAYERS, LAYERS, over_depth
+from host.catalogue.unknown import AS_OF_PLANE, FORMS, IN_LAYERS, LAYERED_DEGREE, over_depth
 from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.fits.fitter import Fitter
@@ -80,7 +80,7 @@ def test_water_in_layers_shows_as_a_force_that_goes_with_the_depth() -> None:
     assert max(gains, key=lambda name: gains[name]) == "unknown_force_in_layers"
     found = fitter.grown(fitter.root, "unknown_force_in_layers", [])
     assert fitter.excess(found.fit) < 1.5
-    assert fitter.free_parameters(found.names) - fitter.free_parameters(fitter.root.names) == LAYERS
+    assert fitter.free_parameters(found.names) - fitter.free_parameters(fitter.root.names) == LAYERED_DEGREE
 
 
 def test_a_form_in_layers_is_told_by_its_depths() -> None:
@@ -98,7 +98,7 @@ def test_a_form_in_layers_is_told_by_its_depths() -> None:
 def test_a_vehicle_that_hardly_dives_is_not_asked_for_layers() -> None:
     dive = hidden_dive(duration=30.0)
     level = replace(dive, depth=20.0 + (dive.depth - 20.0) * DIVE / np.ptp(dive.depth) * 0.9)
-    assert {*FORMS} - {*Fitter([level]).forms} == {*IN_LAYERS}
+    assert {form.name for form in {*FORMS} - {*Fitter([level]).forms}} == IN_LAYERS
     deeper = replace(dive, depth=20.0 + (dive.depth - 20.0) * DIVE / np.ptp(dive.depth) * 1.1)
     assert Fitter([deeper]).forms == FORMS
 

@@ -6,7 +6,7 @@ import pytest
 
 from host.compiled import carried_slopes as module
 from host.compiled.all_rows import AllRows
-from host.compiled.carried_slopes import CarriedSlopes
+from host.compiled.carried_slopes import CarriedSlopes, Passage
 
 RANDOM = np.random.default_rng(5)
 ROWS = 150
@@ -67,7 +67,7 @@ def test_they_are_those_of_the_run(
     S = np.zeros((3, 5))
     S[:, 2:] = np.eye(3)
     gains = None if corrections is None else corrections[:6]
-    found = model()[2](states, within, p, drive, S, present, gains)
+    found = model()[2](Passage(states, within, p, drive, S, present, gains))
     assert found.shape == (2, 5, ROWS)
     for column, moved in enumerate(np.eye(5) * 1e-6):
         ends = [run(p + s * moved[:2], start + s * moved[2:], drive, substeps, corrections) for s in (1, -1)]

@@ -75,7 +75,9 @@ class Setting:
         depths = np.concatenate([recording.depth for recording in recordings])
         top, bottom = float(np.nanmin(depths)), float(np.nanmax(depths))
         self.held |= dict.fromkeys(SHALLOWEST.values(), top) | dict.fromkeys(DEEPEST.values(), bottom)
-        self.forms = FORMS if bottom - top > DIVE else tuple(one for one in FORMS if one not in IN_LAYERS)
+        self.forms = (
+            FORMS if bottom - top > DIVE else tuple(one for one in FORMS if one.name not in IN_LAYERS)
+        )
         if top < SHALLOW:
             self.candidates += NEAR_THE_SURFACE
         alarms = [alarm for recording in recordings for alarm in recording.alarms]

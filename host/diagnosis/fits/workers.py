@@ -127,13 +127,13 @@ def _call(
 
 
 def _fitter_at(place: Path) -> Fitter:
-    if place not in _opened:
-        _opened[place] = Fitter(*pickle.loads(place.read_bytes()))
-        for old in list(_opened)[:-FITTERS_KEPT]:
-            del _opened[old]
-            for key in [key for key in _beside if key[0] == old]:
-                del _beside[key]
-    return _opened[place]
+    fitter = _opened.pop(place, None) or Fitter(*pickle.loads(place.read_bytes()))
+    _opened[place] = fitter  # the last that was used goes last
+    for old in list(_opened)[:-FITTERS_KEPT]:
+        del _opened[old]
+        for key in [key for key in _beside if key[0] == old]:
+            del _beside[key]
+    return fitter
 
 
 def _fitter_beside(place: Path, base: Explanation) -> Fitter:

@@ -13,12 +13,13 @@ import numpy as np
 
 from host.catalogue.kin import OFFSETS
 from host.catalogue.moments import SCANS
+from host.catalogue.unknown import IN_LAYERS
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LITTLE
 from host.diagnosis.fits.prospects import form_gains
 from host.diagnosis.fits.workers import Workers
-from host.diagnosis.search.outset import IN_TIME, LAYERS, says_all
+from host.diagnosis.search.outset import IN_TIME, says_all
 from host.diagnosis.search.short_runs import ShortRuns, best_of_all
 from host.likelihood.output_error import output_error
 from host.recordings.left_out import Span
@@ -71,7 +72,7 @@ def stretches_apart(short: ShortRuns, jobs: int = 1) -> Apart:
         return NOTHING
     least = SHARE * _less(short.whole, taught.whole)
     forms = form_gains(short.fitter, short.whole)
-    if _most_of(forms, beside={*IN_TIME, *LAYERS}) > least:
+    if _most_of(forms, beside={*IN_TIME, *IN_LAYERS}) > least:
         return NOTHING
     instead = _with_an_effect(short.fitter, short.whole, least, jobs)
     if instead is not None:  # of the catalogue, too, something goes with the depth

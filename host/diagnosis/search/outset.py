@@ -50,9 +50,6 @@ IN_TIME = ("surface_waves", "internal_wave", "unknown_swinging_moment", *sorted(
 """What swings with one period, or wanders. Of a sea it follows a part: little must be left beside it."""
 
 
-LAYERS = frozenset(form.name for form in IN_LAYERS)
-
-
 def at_the_outset(fitter: Fitter) -> Explanation | None:
     """The root with all that every vehicle has, where the root leaves much; None where it does not."""
     if fitter.excess(fitter.root.fit) < MUCH:
@@ -74,25 +71,24 @@ def beside_what_leads(fitter: Fitter, best: Explanation, jobs: int = 1) -> Expla
     Or, if that promises most, goes with the depth. Where it leads nowhere; where it leaves much, beside all
     these but what changes.
     """
+    names: tuple[str, ...] = (*DRIVE, *IN_TIME)
     if fitter.excess(best.fit) > LOST:
-        layers = _layers(fitter, best)
-        led = _beside_what_leads(fitter, best, (*SCANS, *DRIVE, *IN_TIME, *layers), jobs)
-        led += _joined_by(fitter, best, layers, jobs)
-        return min([best, *led], key=lambda e: e.bic)
-    best = min(best, _by_fewer(fitter, fitter.root, best, jobs), key=lambda e: e.bic)
-    if fitter.excess(best.fit) > MUCH:
-        layers = _layers(fitter, best)
-        led = _beside_what_leads(fitter, best, (*DRIVE, *IN_TIME, *layers), jobs)
-        led += _joined_by(fitter, best, layers, jobs)
-        best = min([best, *led], key=lambda e: e.bic)
-    return best
+        names = (*SCANS, *names)
+    else:
+        best = min(best, _by_fewer(fitter, fitter.root, best, jobs), key=lambda e: e.bic)
+    if fitter.excess(best.fit) < MUCH:
+        return best
+    layers = _layers(fitter, best)
+    led = _beside_what_leads(fitter, best, (*names, *layers), jobs)
+    return min([best, *led, *_joined_by(fitter, best, layers, jobs)], key=lambda e: e.bic)
 
 
 def _layers(fitter: Fitter, whole: Explanation) -> list[str]:
     """The forms that go with the depth, if one of them promises most of all forms."""
-    gains = form_gains(fitter, whole)
-    leading = max(gains, key=lambda name: gains[name])
-    return sorted(LAYERS) if leading in LAYERS and gains[leading] > margin(whole) else []
+    asked = sorted(form.name for form in fitter.forms if form.name in IN_LAYERS)
+    gains = form_gains(fitter, whole) if asked else {}
+    leading = max(gains, key=lambda name: gains[name], default="")
+    return asked if leading in asked and gains[leading] > margin(whole) else []
 
 
 def _joined_by(fitter: Fitter, whole: Explanation, names: list[str], jobs: int) -> list[Explanation]:
@@ -186,7 +182,7 @@ def pushed_by_forces(search: "Search", whole: Explanation) -> Explanation | None
     beside a change or a fault of the plane's drive may be another of these.
     """
     fitter = search.fitter
-    is_described = bool(whole.names & {*SCANS, *DRIVE, *IN_TIME, *LAYERS})
+    is_described = bool(whole.names & {*SCANS, *DRIVE, *IN_TIME, *IN_LAYERS})
     if is_described or not LITTLE < fitter.excess(whole.fit) < LOST:
         return None
     sea = with_sea(fitter, whole)

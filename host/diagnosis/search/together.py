@@ -31,7 +31,9 @@ if TYPE_CHECKING:
     from host.diagnosis.search.search import Search
 
 MOST_BESIDE = 3  # effects beside those that every vehicle has
-FAR_TOO_MUCH = 100.0  # times the noise floor, of an excerpt: of all, ends were found a third as far away
+FAR_TOO_MUCH = (
+    100.0  # times the noise floor, of an excerpt: over all no end was seen nearer than a fifth of that
+)
 HARDLY_LESS = 0.95  # of what is left over the noise floor: another effect beside so many leads nowhere
 
 

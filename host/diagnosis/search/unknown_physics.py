@@ -70,7 +70,7 @@ def unknown_in(explanation: Explanation) -> list[str]:
     for form in (UNKNOWN[name] for name in _forms_in(explanation)):
         listed = [f"{p.name} = {values[p.name]:.3g} {p.unit}" for p in form.parameters]
         told = f"; {', '.join(listed)}" if len(listed) <= MOST_TOLD else ""
-        told += _over_depth(form, values) if form in IN_LAYERS else ""
+        told += _over_depth(form, values) if form.name in IN_LAYERS else ""
         said.append(f"{form.sentence[:-1]} ({form.equation}{told}).")
     return said
 
