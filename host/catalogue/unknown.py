@@ -238,12 +238,18 @@ IN_LAYERS = frozenset(_LAYERED)
 """Asked only of a vehicle that dives: over less, anything goes with the depth."""
 
 
+def terms_over_depth(name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
+    """Depths, m (100,), and the terms T_k (100, n) of a form in layers there, of which it is the sum."""
+    top, bottom = (values[parameter.name] for parameter in _LAYERED[name].parameters[LAYERED_DEGREE:])
+    x = np.linspace(-1.0, 1.0, 100)
+    terms = np.polynomial.chebyshev.chebvander(x, LAYERED_DEGREE)[:, 1:]
+    return top + (bottom - top) * (x + 1.0) / 2.0, np.asarray(terms, dtype=float)
+
+
 def over_depth(name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
     """Depths, m, and what a form in layers makes of them, by the values of its parameters (100,) each."""
-    *shares, top, bottom = (values[parameter.name] for parameter in _LAYERED[name].parameters)
-    x = np.linspace(-1.0, 1.0, 100)
-    sizes = np.asarray(np.polynomial.chebyshev.chebval(x, [0.0, *shares]), dtype=float)
-    return top + (bottom - top) * (x + 1.0) / 2.0, sizes
+    depths, terms = terms_over_depth(name, values)
+    return depths, terms @ [values[share.name] for share in _LAYERED[name].parameters[:LAYERED_DEGREE]]
 
 
 FORMS: tuple[Effect, ...] = (

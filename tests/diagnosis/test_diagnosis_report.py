@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hidden_dive import hidden_dive
 
 from host.catalogue import BY_NAME
 from host.catalogue.moments import SCANS
@@ -14,6 +15,7 @@ from host.diagnosis.answer import Against, Answer
 from host.diagnosis.diagnose import Diagnosis, NamedEffect
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.separation import separations
+from host.diagnosis.told.pictures import layers_picture
 from host.diagnosis.told.report import _dated, write_report
 
 
@@ -103,3 +105,12 @@ def test_each_change_has_one_moment_to_tell(name: str) -> None:
     (time,) = (p.name for p in BY_NAME[name].parameters if p.name.endswith("_time"))
     told = _dated(NamedEffect(name=name, delta_bic=99.0, coefficients=coefficients))
     assert told.endswith(f"(at {coefficients[time][0]:.0f} s)")
+
+
+def test_what_goes_with_the_depth_is_drawn_over_it(coupled: Diagnosis) -> None:
+    assert layers_picture(coupled) == ""
+    dive = hidden_dive(lambda _, x, __: (0.1 * np.tanh(x[3] - 15.0), 0.0, 0.0), duration=60.0)
+    fitter = Fitter([dive])
+    layered = fitter.grown(fitter.root, "unknown_force_in_layers", [])
+    picture = layers_picture(replace(coupled, recordings=[dive], extended=layered))
+    assert picture.startswith("data:image/png;base64,")

@@ -7,6 +7,8 @@ import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.ticker import NullFormatter
 
+from host.catalogue import UNKNOWN
+from host.catalogue.unknown import IN_LAYERS, terms_over_depth
 from host.diagnosis.answer import Answer
 from host.diagnosis.diagnose import Diagnosis
 from host.diagnosis.fits.explanation import Explanation
@@ -16,6 +18,7 @@ from host.diagnosis.proof.scoring import free_run_errors
 from host.diagnosis.recordings.spans import divide
 from host.diagnosis.separation import Separation
 from host.identification.plots import MEASURED, MODEL, RUDDER, data_uri, line_through, plane_trace
+from host.identification.uncertainty import covariance
 from host.recordings.recording import Array, Recording
 
 BASE_COLOUR, SIMULATION_COLOUR, BAND, JUDGING = "#dd8452", "#7b5ea7", "#e3edf4", "#f3f0e6"
@@ -168,6 +171,36 @@ def force_picture(found: Diagnosis) -> str:
             axis.plot(*_means(scale * motion[key], values), "o-", color="#222222", markersize=3)
             axis.set_xlabel(name)
     axes[1][0].set_xlabel("time, s")
+    figure.tight_layout()
+    return data_uri(figure)
+
+
+def layers_picture(found: Diagnosis) -> str:
+    """What acts over the depth by the forms in layers, two deviations of it, and how long it was there."""
+    fit = found.extended.fit
+    forms = sorted(found.extended.names & IN_LAYERS)
+    if not forms:
+        return ""
+    spread = covariance(fit)
+    values = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
+    dwelt = np.concatenate([recording.depth for recording in found.recordings])
+    figure, axes = plt.subplots(
+        1, len(forms) + 1, figsize=(9.5, 3.4), sharey=True, width_ratios=[*(2.4 for _ in forms), 1.0]
+    )
+    for axis, form in zip(axes, (UNKNOWN[name] for name in forms), strict=False):
+        depths, terms = terms_over_depth(form.name, values)
+        own = [fit.structure.names.index(share.name) for share in form.parameters[: terms.shape[1]]]
+        sizes, std = terms @ fit.parameters[own], np.sqrt(np.sum(terms @ spread[np.ix_(own, own)] * terms, 1))
+        axis.fill_betweenx(depths, sizes - 2 * std, sizes + 2 * std, color="#f3d5cf", linewidth=0)
+        axis.plot(sizes, depths, color=MODEL, linewidth=1.2)
+        reach = max(np.ptp(sizes), 1e-9)
+        axis.set_xlim(sizes.min() - 0.4 * reach, sizes.max() + 0.4 * reach)
+        what = form.name.removeprefix("unknown_").removesuffix("_in_layers")
+        axis.set_xlabel(f"{what} but for a constant, {form.parameters[0].unit}")
+    axes[-1].hist(dwelt, bins=30, orientation="horizontal", color=MEASURED)
+    axes[-1].set_xlabel("rows read there")
+    axes[0].set_ylabel("depth, m")
+    axes[0].set_ylim(dwelt.max(), dwelt.min())
     figure.tight_layout()
     return data_uri(figure)
 

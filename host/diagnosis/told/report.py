@@ -18,6 +18,7 @@ from host.diagnosis.search.unknown_physics import unknown_in
 from host.diagnosis.told.pictures import (
     base_name,
     force_picture,
+    layers_picture,
     proof_picture,
     runs_picture,
     separation_picture,
@@ -70,6 +71,7 @@ def write_report(answer: Answer, vehicle: str, path: Path) -> None:
             "proof": proof_picture(answer),
             "slots": slots_picture(found),
             "force": force_picture(found),
+            "layers": layers_picture(found),
             "separation": separation_picture(answer.separations),
         },
     )
