@@ -46,14 +46,10 @@ def explain(
 
     is_second  the plane was taken the other way before, and all searched so
     """
-    if part is not None and part.is_of_all and part.waves is not None:
-        return again_in_a_swell(fitter, workers, on_progress, part, part.waves)
-    if part is not None and (part.is_of_all or part.left.is_by_speed):
-        return again_astray(fitter, workers, on_progress, part)
-    known = None if part is None else part.search
-    if part is not None and part.best.fit.has_coloured_noise:
-        return again_in_drift(fitter, workers, on_progress, part)
-    search = Search(fitter, workers, on_progress, fitter.base, fitter.root, known, way.alone)
+    if part is not None and (settled := _of_a_part(fitter, workers, on_progress, part)) is not None:
+        return settled
+    before = None if part is None else part.search
+    search = Search(fitter, workers, on_progress, fitter.base, fitter.root, before, way.alone)
     waves = way.waves if part is None else None
     search.asks_drift, search.is_second = waves is None, is_second
     if part is None and (whole := _begun_with_all(search, way)) is not None:
@@ -63,54 +59,40 @@ def explain(
         search.instead = plain.leave_nothing
     again = [fitter.refitted(one) for one in _found_in(part)] if part else _alike(fitter, like)
     search.outset = way.outset if not again else None
-    best = search.run(again)
-    drift = None if search.adrift is None else in_drift(search, search.adrift)
-    if drift is not None and drift.left.is_nothing:
-        return drift
+    best, drift = search.run(again), None
     if search.adrift is not None:
+        drift = in_drift(search, search.adrift)
+        if drift is not None and drift.left.is_nothing:
+            return drift
         tried = search.tried.values()
         search = Search(fitter, workers, on_progress, fitter.base, fitter.root, alone=search.alone_so_far())
         search.is_second = is_second
         best = search.run(again or _many_in(fitter, tried))
-    left, told, calm = leftover(fitter, best), None, best
     may_be_sea = part is None or part.best.fit.has_process_noise
-    is_astray = may_be_sea and not (left.is_nothing or best.fit.has_process_noise)
-    if is_astray and (led := led_astray(search, best)) is not None:
-        left_then = leftover(fitter, led[1])
-        is_led = search.follows_no_free_run or left_then.is_nothing
-        if is_led and not _does_a_form_more(search, best, led[1]):
-            return Explained(led[1], led[0], left_then, None)
-    swung = None if plain is None or left.is_nothing else plain.instead_of(calm)
-    if swung is not None and swung.left.is_nothing:
-        return swung
-    # Where no free run comes near, none tells a form of unknown physics from another.
-    if not search.is_pushed_about and (best.names or not left.is_nothing):
-        grown = with_unknown(search, best)
-        if grown is not best and not unknown_in(grown):
-            grown = told_by_the_usual(search, grown)  # what joined late has not been asked yet
-        best, left = grown, leftover(fitter, grown)
-    if may_be_sea and (unknown_in(best) or not left.is_nothing):
-        swung = None if plain is None else plain.instead_of(calm)
+    if may_be_sea and (led := _led_astray(search, best)) is not None:
+        return led
+    if plain is not None and not leftover(fitter, best).is_nothing:
+        swung = plain.instead_of(best)
         if swung is not None and swung.left.is_nothing:
             return swung
-        calm = best
-        search, best = in_a_sea(search, best)
-        if swung is not None and explains_more(swung, best):
-            return swung
-        if part is None or part.waves is not None:
-            search, best, told = among_waves(search, best, calm)
-        left = leftover(fitter, best) if told is None else left_among(fitter, told)
-        if told is None and not left.is_by_speed:
-            drift = drift or among_drift(search, best)
-            if drift is not None and drift.best.bic < as_filtered(fitter, best).bic - NAMING_MARGIN:
-                return drift
-    if told is None and (lean := leanest(search, with_drags_instead(search, best))) is not best:
-        best, left = lean, leftover(fitter, lean)
-    if told is None and best.fit.has_process_noise and left.is_nothing and not left.is_by_speed:
-        grown = with_unknown(search, best)  # forces large enough for it take anything for noise
-        if unknown_in(grown):
-            best, left = grown, leftover(fitter, grown)
-    return Explained(best, search, left, told)
+    known, best = best, _beside_what_is_unknown(search, best)
+    if may_be_sea and (unknown_in(best) or not leftover(fitter, best).is_nothing):
+        may_swing = part is None or part.waves is not None
+        return _in_disturbed_water(search, known, best, plain, drift, may_swing)
+    return _leanest(search, best)
+
+
+def _of_a_part(
+    fitter: Fitter, workers: Workers, on_progress: Callable[[str], None], part: Explained
+) -> Explained | None:
+    """All of it under the waves, the forces or the drift that a part was found beside; None beside none."""
+    if part.is_of_all and part.waves is not None:
+        return again_in_a_swell(fitter, workers, on_progress, part, part.waves)
+    if part.is_of_all or part.left.is_by_speed:
+        return again_astray(fitter, workers, on_progress, part)
+    if part.best.fit.has_coloured_noise:
+        return again_in_drift(fitter, workers, on_progress, part)
+    return None
 
 
 def _begun_with_all(search: Search, way: Way) -> Explained | None:
@@ -145,6 +127,21 @@ class _PlainWaves:
         return against(self._found, self._waves, best)
 
 
+def _led_astray(search: Search, best: Explanation) -> Explained | None:
+    """The same under slight forces, where these lead every free run away and no form does more; else None."""
+    if best.fit.has_process_noise or leftover(search.fitter, best).is_nothing:
+        return None
+    if (led := led_astray(search, best)) is None:
+        return None
+    left = leftover(search.fitter, led[1])
+    is_led = search.follows_no_free_run or left.is_nothing
+    return (
+        Explained(led[1], led[0], left, None)
+        if is_led and not _does_a_form_more(search, best, led[1])
+        else None
+    )
+
+
 def _does_a_form_more(search: Search, best: Explanation, led: Explanation) -> bool:
     """Whether forms of unknown physics are likelier than forces that may be errors of the measured speed.
 
@@ -155,6 +152,64 @@ def _does_a_form_more(search: Search, best: Explanation, led: Explanation) -> bo
         return False
     grown = with_unknown(search, best)
     return bool(unknown_in(grown)) and as_filtered(search.fitter, grown).bic < led.bic - NAMING_MARGIN
+
+
+def _beside_what_is_unknown(search: Search, best: Explanation) -> Explanation:
+    """The set with forms of unknown physics, or effects that joined beside them, where these pay.
+
+    Where no free run comes near, none tells one form from another.
+    """
+    is_all = not best.names and leftover(search.fitter, best).is_nothing
+    if search.is_pushed_about or is_all:
+        return best
+    grown = with_unknown(search, best)
+    if grown is not best and not unknown_in(grown):
+        return told_by_the_usual(search, grown)  # what joined late has not been asked yet
+    return grown
+
+
+def _in_disturbed_water(
+    search: Search,
+    known: Explanation,
+    best: Explanation,
+    plain: "_PlainWaves | None",
+    drift: Explained | None,
+    may_swing: bool,
+) -> Explained:
+    """The same in waves, under random forces or beside what drifts, whichever explains most.
+
+    known      what was found without forms of unknown physics
+    drift      what was found beside what drifts, where that was plain
+    may_swing  whether forces may swing as waves do
+    """
+    fitter = search.fitter
+    swung = None if plain is None else plain.instead_of(known)
+    if swung is not None and swung.left.is_nothing:
+        return swung
+    calm = best
+    search, best = in_a_sea(search, best)
+    if swung is not None and explains_more(swung, best):
+        return swung
+    if may_swing:
+        search, best, told = among_waves(search, best, calm)
+        if told is not None:
+            return Explained(best, search, left_among(fitter, told), told)
+    if not leftover(fitter, best).is_by_speed:
+        drift = drift or among_drift(search, best)
+        if drift is not None and drift.best.bic < as_filtered(fitter, best).bic - NAMING_MARGIN:
+            return drift
+    return _leanest(search, best)
+
+
+def _leanest(search: Search, best: Explanation) -> Explained:
+    """The set less what does not pay after all, and what unknown physics gains even under random forces."""
+    best = leanest(search, with_drags_instead(search, best))
+    left = leftover(search.fitter, best)
+    if best.fit.has_process_noise and left.is_nothing and not left.is_by_speed:
+        grown = with_unknown(search, best)  # forces large enough for it take anything for noise
+        if unknown_in(grown):
+            best, left = grown, leftover(search.fitter, grown)
+    return Explained(best, search, left, None)
 
 
 def _alike(fitter: Fitter, like: Explanation | None) -> list[Explanation]:
