@@ -213,6 +213,12 @@ class Structure:
     def states(self) -> tuple[str, ...]:
         return STATES + tuple(effect.state for effect in self.effects if effect.state is not None)
 
+    @cached_property
+    def servos(self) -> tuple[int, ...]:
+        """Places among the states of what stands between a command and the plane's angle."""
+        own = [effect.state for effect in self.effects if effect.actuator is not None]
+        return tuple(k for k, name in enumerate(self.states) if name in own)
+
     @property
     def needs_lags(self) -> bool:
         return any(effect.lags for effect in self.effects)

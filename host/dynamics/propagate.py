@@ -26,6 +26,7 @@ LONGEST_SUBSTEP = 0.05  # s; for a 10 rad/s mode the error of one sub-step is be
 LONGEST_OF_ALL = 0.5  # s; a quarter of the shortest period of a wave
 FIRST_LAG = 6  # of the rows of `drive`: what stands before the earlier commands
 LONGEST_DELAY = 1.0  # s; how far back commands are looked up
+NONE = np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +54,7 @@ class Inputs:
     whitening: Whitenings = NOT_WHITENED
     unseen: UnseenPlane | None = None
     shared: Structure | None = None
+    before: Array = field(default_factory=lambda: np.zeros((FIRST_LAG, 0)))
 
     def of(self, structure: Structure, shared: Structure | None = None) -> "Inputs":
         """What drives other equations over the same recording, which look back as far."""
@@ -62,7 +64,7 @@ class Inputs:
         """The same with other commands, rad (N,)."""
         rest = self.drive[1:FIRST_LAG]
         lags = self.drive.shape[0] - FIRST_LAG
-        return replace(self, drive=np.vstack([rudder, rest, *_earlier(rudder, lags)]))
+        return replace(self, drive=np.vstack([rudder, rest, *_earlier(rudder, lags, self.before[0])]))
 
     @property
     def evaluated(self) -> Structure:
@@ -115,7 +117,7 @@ def inputs_of(
                 intervals,
                 recording.time,
                 surge,
-                *_earlier(recording.rudder, lags),
+                *_earlier(recording.rudder, lags, recording.before[1]),
             ]
         ),
         measured=np.where(present, measured, 0.0),
@@ -123,13 +125,26 @@ def inputs_of(
         substeps=int(np.ceil(recording.step / max(longest_substep, recording.step / MOST_SUBSTEPS) - 1e-6)),
         steps=steps,
         whitening=whitening,
+        before=_before(recording, lags),
     )
 
 
-def _earlier(rudder: Array, lags: int) -> list[Array]:
-    """Commands one row ago, two, and so on; the first stood before the recording."""
-    count = rudder.size
-    return [np.append(np.full(min(lag, count), rudder[0]), rudder)[:count] for lag in range(1, lags + 1)]
+def _before(recording: Recording, lags: int) -> Array:
+    """The rows of `Inputs.before`."""
+    time, rudder = recording.before
+    intervals = np.diff(time, append=recording.time[:1])
+    unknown = np.zeros_like(time)
+    return np.vstack([rudder, unknown, unknown, intervals, time, unknown, *_earlier(rudder, lags)])
+
+
+def _earlier(rudder: Array, lags: int, before: Array = NONE) -> list[Array]:
+    """Commands one row ago, two, and so on; the first that is known stood before it."""
+    known = np.append(before, rudder)
+    first, count = before.size, rudder.size
+    if not known.size:
+        return [known] * lags
+    padded = np.append(np.full(lags, known[0]), known)
+    return [padded[lags + first - lag :][:count] for lag in range(1, lags + 1)]
 
 
 def longest_substep(parameters: Array, step: float) -> float:
@@ -276,9 +291,43 @@ def begun_at(pitch: float, depth: float) -> Array:
 
 def start_of(form: Form, parameters: Array, initial: Array, inputs: Inputs) -> tuple[Array, Array]:
     """All states at the first row (nx,), and their derivatives by the parameters and by `initial` (5,)."""
-    table = _initial(form)(initial, inputs.widened(parameters), inputs.drive[:, 0])
+    values = inputs.widened(parameters)
+    table = _initial(form)(initial, values, inputs.drive[:, 0])
+    if inputs.before.size and (servos := form.structure.servos):
+        table[list(servos)] = led_in(form, initial, values, inputs.before)
     own = [*inputs.own, *range(form.np, form.np + NX0)]
     return table[:, 0].copy(), table[:, 1:][:, own]
+
+
+def led_in(form: Form, initial: Array, values: Array, before: Array) -> Array:
+    """Where the rows before the first lead the plane's actuators, settled at the first of these, and slopes.
+
+    Side by side, (actuators, 1 + parameters + 5), as all states at the first row.
+    """
+    servos = list(form.structure.servos)
+    settled = _initial(form)(initial, values, before[:, 0])[servos]
+    led = over_rows(_led, form, before.shape[1])(settled[:, : 1 + form.np].T.ravel(), before, values)[:, -1]
+    settled[:, : 1 + form.np] = led.reshape((-1, len(servos))).T
+    return settled
+
+
+@lru_cache(KEPT)
+def _led(form: Form) -> ca.Function:
+    """The actuators over one row, and their slopes by the parameters, S' = F_x S + F_p."""
+    _, p, drive = form.symbols()
+    servos = form.structure.servos
+    held = ca.SX.sym("held", len(servos))
+    S = ca.SX.sym("S", len(servos), form.np)
+    after = held
+    for k in range(form.substeps):
+        x = ca.SX(form.nx, 1)
+        x[list(servos)] = after
+        chain = form.structure.chain(x, p, drive, drive[4] + k * drive[3] / form.substeps)
+        moved = form.structure.actuate(chain, drive[3] / form.substeps)
+        after = ca.vertcat(*(moved[form.structure.states[place]] for place in servos))
+    slopes = ca.jacobian(after, held) @ S + ca.jacobian(after, p)
+    carried, on = ca.vertcat(held, ca.vec(S)), ca.densify(ca.vertcat(after, ca.vec(slopes)))
+    return ca.Function("led", [carried, drive, p], [on, on])
 
 
 @dataclass(frozen=True, slots=True)

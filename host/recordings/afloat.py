@@ -14,7 +14,9 @@ from host.recordings.recording import Array, Recording
 
 AFLOAT, LEFT = 0.5, 1.0  # m: depth of a vehicle at the surface, and by which it has left it
 ABOVE = -0.5  # m: where depth is less than that, it is not counted from the surface
-LONG_ENOUGH, MOSTLY = 15.0, 0.5  # s at the surface with the plane at rest, and share of what is above `LEFT`
+LONG_ENOUGH, MOSTLY = 15.0, 0.5  # s at the surface, and share of what is above `LEFT`
+DIVES = 2.0  # m: of a vehicle that never goes deeper, and works its plane, depth may count from elsewhere
+KEPT = 0.15  # m, within which half of all depths lie at the surface
 SMOOTHED = 5.0  # s, of which the median depth counts: a wave or a spike is no dive
 STILL = 0.01  # rad (a unit of another actuator): a plane that moves no more than this is at rest
 LONGEST_ASCENT = 60.0  # s, for which a vehicle floats up with its plane at rest before it is at the surface
@@ -72,11 +74,20 @@ def _afloat(recording: Recording) -> NDArray[np.bool_]:
     shallow = np.diff(depth < LEFT, prepend=False, append=False)
     for first, end in np.flatnonzero(shallow).reshape(-1, 2):
         lasting, rudder = recording.intervals[first:end], recording.rudder[first:end]
-        # Where the plane works, the vehicle is flown, and its depth may count from elsewhere.
-        lies = (depth[first:end] < AFLOAT) & (np.abs(rudder - np.median(rudder)) <= STILL)
-        if lasting[lies].sum() >= max(LONG_ENOUGH, MOSTLY * lasting.sum()):
+        is_up, half = depth[first:end] < AFLOAT, MOSTLY * lasting.sum()
+        is_at_rest = np.abs(rudder - np.median(rudder)) <= STILL
+        if lasting[is_up & is_at_rest].sum() >= max(LONG_ENOUGH, half):
             afloat[_ascent(recording, int(first)) : end] = True
+        elif depth.max() > DIVES and _keeps(depth[first:end][is_up]):
+            # Most missions begin or end so, and little is lost there.
+            least = 0.0 if first == 0 or end == depth.size else LONG_ENOUGH
+            afloat[first:end] |= lasting[is_up].sum() >= max(least, half)
     return afloat
+
+
+def _keeps(depth: Array) -> bool:
+    """Whether a depth at the surface, m, hardly changes: that of a hull that dives by its plane does."""
+    return depth.size > 0 and float(np.subtract(*np.percentile(depth, [75, 25]))) < KEPT
 
 
 def _ascent(recording: Recording, first: int) -> int:

@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 NEEDED = ("depth", "pitch", "rudder")
 LONGEST_BETWEEN_SPEEDS = 2.5  # s, between two readings: a manoeuvre slows the vehicle within a few
 STANDING = 0.02  # m/s
+LED_IN = 6.0  # s: what a servo still has of its commands, a delay of them, and where play was left
 USUAL_GAPS = 5.0  # of those between two readings of the plane, beyond which it is lost
 
 
@@ -36,6 +37,8 @@ class Recording:
     counts      what was refused in the whole file, by cause
     notes       what was lost or decided on the user's behalf, one sentence each
     alarms      s, on the axis of time: when the vehicle was found to move no longer as it did
+    before      s and rad (2, L): the rows just before the first, where it was cut from a longer one, and the
+                rudder there
     """
 
     name: str
@@ -54,6 +57,7 @@ class Recording:
     counts: Counter[str] = field(default_factory=Counter)
     notes: tuple[str, ...] = ()
     alarms: tuple[float, ...] = ()
+    before: Array = field(default_factory=lambda: np.zeros((2, 0)))
 
     @property
     def has_speed(self) -> bool:
@@ -82,7 +86,16 @@ class Recording:
             pitch_rate=self.pitch_rate[rows],
             plane_doubt=None if self.plane_doubt is None else self.plane_doubt[:, :, rows],
             alarms=tuple(alarm for alarm in self.alarms if start <= alarm < end),
+            before=self._led_in(rows),
         )
+
+    def _led_in(self, rows: NDArray[np.bool_]) -> Array:
+        """Times and rudder (2, L) of the last rows before the first of these."""
+        if not rows.any():
+            return self.before
+        first = int(np.argmax(rows))
+        all_before = np.hstack([self.before, np.vstack([self.time, self.rudder])[:, :first]])
+        return np.asarray(all_before[:, all_before[0] >= self.time[first] - LED_IN])
 
 
 def split_at_gaps(

@@ -102,9 +102,28 @@ def test_what_is_no_surface_stays(depth: Array) -> None:
 def test_a_plane_that_works_at_depth_zero_is_no_surface() -> None:
     """As in simulations that begin there."""
     depth = legs((0.1, 60.0), (4.0, 120.0))
-    whole = recording(depth, flown(depth.size))
+    wave = np.where(depth < 1.0, 0.3 * np.sin(0.1 * np.arange(depth.size)), 0.0)
+    whole = recording(depth + wave, flown(depth.size))
     assert under_water([whole]) == [whole]
     assert len(under_water([recording(depth)])[0].time) < depth.size
+
+
+@pytest.mark.parametrize("seconds", [8.0, 60.0])
+def test_a_mission_that_begins_and_ends_at_the_surface_with_its_plane_at_work_is_cut(seconds: float) -> None:
+    depth = legs((0.1, seconds), (4.0, 120.0), (0.2, seconds))
+    (dive,) = under_water([recording(depth, flown(depth.size))])
+    assert dive.depth.min() > 0.8
+    assert "at the surface, and left out" in dive.notes[-1]
+    shallow = recording(legs((0.1, seconds), (1.5, 120.0)), flown(legs((0.1, seconds), (1.5, 120.0)).size))
+    assert under_water([shallow]) == [shallow]
+
+
+@pytest.mark.parametrize(("seconds", "is_cut"), [(8.0, False), (40.0, True)])
+def test_between_two_dives_a_short_time_near_the_surface_is_no_reason_to_cut(
+    seconds: float, is_cut: bool
+) -> None:
+    depth = legs((4.0, 100.0), (0.2, seconds), (4.0, 100.0))
+    assert (len(under_water([recording(depth, flown(depth.size))])) > 1) == is_cut
 
 
 def test_spikes_and_losses_at_the_surface_are_no_dive() -> None:

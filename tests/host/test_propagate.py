@@ -1,11 +1,15 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from exact_dive import TABLE_1, Dive, fly
 from scipy.stats import multivariate_normal
 
-from host.dynamics.propagate import free_run, inputs_of, longest_substep
+from host.catalogue import structure_of
+from host.dynamics.propagate import FIRST_LAG, free_run, inputs_of, longest_substep
 from host.dynamics.sensitivities import innovations
 from host.likelihood.kalman import kalman_pass
+from host.recordings.recording import LED_IN
 
 TRUTH = np.array([*TABLE_1.values(), 0.0, 0.0])
 
@@ -97,3 +101,52 @@ def test_kalman_likelihood_equals_the_dense_gaussian() -> None:
 def _transition_by_differences(inputs):  # type: ignore[no-untyped-def]
     base = free_run(TRUTH, np.zeros(5), inputs).states[:, 1]
     return np.column_stack([free_run(TRUTH, unit, inputs).states[:, 1] - base for unit in np.eye(5)[:4]])
+
+
+SERVO = ("actuator_lag", "actuator_rate_limit", "actuator_backlash", "actuator_delay")
+SLOW = {"lag_time": 0.8, "plane_rate": 0.3, "backlash": 0.05, "delay": 0.45}
+
+
+@pytest.mark.parametrize("named", [SERVO[:1], SERVO[1:2], SERVO[2:3], SERVO[3:], SERVO[::3], SERVO[:2]])
+def test_a_stretch_begins_with_its_plane_where_the_rows_before_lead_it(named: tuple[str, ...]) -> None:
+    structure = structure_of(named)
+    values = np.array([*TRUTH, *(SLOW[name] for name in structure.names[TRUTH.size :])])
+    recording, states = fly(Dive(duration=60.0))
+    whole = free_run(values, np.append(states[:, 0], 0.0), inputs_of(recording, structure))
+    moves = np.flatnonzero(np.diff(recording.rudder)) + 2
+    first = int(moves[moves > 100][0])  # in the middle of a movement, 6 s into the recording and more
+    part = recording.between(float(recording.time[first]), np.inf)
+    begun = np.append(whole.states[:4, first], 0.0)
+    led = free_run(values, begun, inputs_of(part, structure)).outputs
+    assert np.abs(led - whole.outputs[:, first:]).max() < 2e-3 * np.ptp(whole.outputs, axis=1).min()
+    alone = free_run(values, begun, inputs_of(replace(part, before=np.zeros((2, 0))), structure)).outputs
+    assert np.abs(alone - whole.outputs[:, first:]).max() > 0.01 * np.ptp(whole.outputs, axis=1).min()
+
+
+def test_sensitivities_know_what_led_the_plane_to_where_a_stretch_begins() -> None:
+    structure = structure_of(("actuator_lag", "actuator_backlash"))
+    values = np.array([*TRUTH, *(SLOW[name] for name in structure.names[TRUTH.size :])])
+    recording, states = fly(Dive(duration=30.0))
+    moves = np.flatnonzero(np.diff(recording.rudder))
+    moved = int(moves[moves > 100][0]) + 3
+    inputs = inputs_of(recording.between(float(recording.time[moved]), np.inf), structure)
+    start = np.append(states[:, moved], 0.0)
+    _, sensitivity = innovations(values, start, inputs)
+    for index in range(values.size):
+        change = 1e-6 * (np.arange(values.size) == index)
+        apart = [free_run(values + sign * change, start, inputs).outputs for sign in (1.0, -1.0)]
+        slope = (apart[0] - apart[1]) / 2e-6
+        assert np.allclose(sensitivity[:, index], slope, atol=2e-4 * max(1.0, np.abs(slope).max()))
+
+
+def test_commands_before_a_stretch_are_those_of_the_recording() -> None:
+    recording, _ = fly(Dive(duration=30.0))
+    structure = structure_of(("actuator_delay",))
+    whole = inputs_of(recording, structure).drive
+    part = recording.between(12.0, 20.0).between(14.0, 18.0)
+    rows = (recording.time >= 14.0) & (recording.time < 18.0)
+    lags = slice(FIRST_LAG, None)
+    assert np.array_equal(inputs_of(part, structure).drive[lags], whole[lags, rows])
+    assert part.before[0].min() == pytest.approx(14.0 - LED_IN)
+    changed = inputs_of(part, structure).with_rudder(np.zeros(part.time.size)).drive
+    assert np.array_equal(changed[-1, :5], whole[-1, rows][:5])
