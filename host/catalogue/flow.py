@@ -4,6 +4,8 @@ import casadi as ca
 
 from host.dynamics.equations import Chain, Effect, Parameter
 
+SLOWEST = 0.2  # of u0: the flow meets the fins of a vehicle that stands still at any angle
+
 
 def _steady_damping(c: Chain) -> None:
     lacking = 1 - c.speed_ratio
@@ -16,6 +18,18 @@ def _cross_flow(c: Chain) -> None:
     across = ca.fmin(ca.fabs(c.w) / c.p["u0"], c.speed_ratio) ** 2
     c.heave += c.p["cross_flow_share"] * across * c.p["b1"] * c.plane
     c.pitch += c.p["cross_flow_share"] * across * c.p["b2"] * c.plane
+
+
+def _fin_stall(c: Chain) -> None:
+    """What the lift of the fins lacks where they meet the flow at a large angle."""
+    p = c.p
+    behind = -ca.sign(p["b2"])  # a plane that pitches nose-down turns into the flow as flow from below does
+    ahead = p["u0"] * ca.fmax(c.speed_ratio, SLOWEST)
+    angle = c.plane + behind * (c.w + p["fin_arm"] * c.q) / ahead
+    beyond = (angle / p["fin_stall_angle"]) ** 2
+    lost = p["fin_stall_loss"] * beyond / (1 + beyond) * angle * c.speed_ratio**2
+    c.heave -= p["b1"] * lost
+    c.pitch -= p["b2"] * lost
 
 
 EFFECTS = (
@@ -51,5 +65,25 @@ EFFECTS = (
         manoeuvre="full plane reversals, during which the hull heaves most",
         probes=((1.0,),),
         force=_cross_flow,
+    ),
+    Effect(
+        name="fin_stall",
+        slot="actuator",
+        parameters=(
+            Parameter(
+                name="fin_stall_angle", unit="rad", lower=0.05, upper=1.5, meaning="half is lost there"
+            ),
+            Parameter(
+                name="fin_stall_loss", unit="1", lower=0, upper=1, meaning="share of lift, lost far beyond"
+            ),
+            Parameter(name="fin_arm", unit="m", lower=0.05, upper=10, meaning="from the middle to the fins"),
+        ),
+        sentence="The fins stall by the angle at which they meet the flow, of which the plane is a part.",
+        equation="w' = ... - b1 L u^2, q' = ... - b2 L u^2, L = fin_stall_loss alpha r/(1 + r), "
+        "r = (alpha/fin_stall_angle)^2, alpha = delta - sign(b2) (w + fin_arm q)/u",
+        manoeuvre="full plane reversals, during which the hull heaves and turns most",
+        probes=((0.4, 0.5, 1.0), (0.5, 1.0, 0.4), (0.5, 1.0, 2.0)),
+        sizes=("fin_stall_loss",),
+        force=_fin_stall,
     ),
 )

@@ -92,7 +92,7 @@ EFFECTS = (
         sentence="Buoyancy changes with depth: the hull or the water is compressed.",
         equation="w' = ... + c_wz (zeta - neutral_depth) cos theta; a3 ~ buoyancy",
         manoeuvre="long straight runs at the shallowest and the deepest depth of the mission",
-        probes=((1e-3, 1.0),),
+        probes=((1e-3, 1.0), (1e-5, 1.0)),  # alone; and beside what leaves little of it to tell
         scales=("", "depth"),
         force=_compressibility,
     ),

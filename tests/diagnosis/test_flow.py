@@ -64,3 +64,37 @@ def test_damping_that_stays_needs_a_speed_that_changes() -> None:
     run = free_run(values, start, inputs_of(dive, structure)).outputs
     plain = free_run(values[:8], start, inputs_of(dive)).outputs
     np.testing.assert_allclose(run, plain, atol=1e-9)
+
+
+ARM = 1.0  # m, from the middle of the hull to its fins
+
+
+def stalling(_: float, x: Array, plane: float) -> tuple[float, float, float]:
+    """Fins whose lift bends as a tanh does: no shape that the catalogue has."""
+    angle = plane + (x[0] + ARM * x[1]) / BASE["u0"]
+    lost = angle - 0.25 * float(np.tanh(angle / 0.25))
+    return 0.8 * BASE["u0"] * x[1] - BASE["b1"] * lost, -BASE["b2"] * lost, 0.0
+
+
+def test_fins_stall_by_the_flow_not_by_their_own_angle() -> None:
+    fitter = Fitter([hidden_dive(stalling, duration=120.0)])
+    hull = fitter.grown(fitter.root, "heave_pitch_rate_coupling", [])
+    by_flow, by_angle = (
+        fitter.polished(fitter.grown(hull, f"{name}_stall", [])) for name in ("fin", "rudder")
+    )
+    assert fitter.excess(hull.fit) > 2.0
+    assert fitter.excess(by_flow.fit) < 1.3
+    assert by_flow.bic < by_angle.bic - 1000.0
+    assert value(by_flow, "fin_arm") == pytest.approx(ARM, rel=0.15)
+
+
+def test_a_plane_that_turns_the_hull_the_other_way_stalls_alike() -> None:
+    dive = hidden_dive(duration=20.0)
+    structure = structure_of(("fin_stall",))
+    values = np.array([*BASE.values(), 0.0, 0.0, 0.3, 0.8, ARM])
+    start = np.array([0.3, 0.1, 0.05, 20.0, 0.0])
+    run = free_run(values, start, inputs_of(dive, structure)).outputs
+    values[[structure.names.index("b1"), structure.names.index("b2")]] *= -1.0
+    other = free_run(values, start, inputs_of(replace(dive, rudder=-dive.rudder), structure)).outputs
+    np.testing.assert_allclose(run, other, atol=1e-9)
+    assert np.ptp(run[1]) > 0.5

@@ -68,7 +68,9 @@ def beam_search(search: "Search") -> None:
                 if pair is not None:
                     beam, postponed = [pair], joint
                 elif _is_only_flexible(search, foreign, leading, joint):
-                    break
+                    if search.fitter.excess(leading.fit) > MUCH:
+                        break
+                    foreign = None  # one effect more may do as well as all these
     if postponed is not None and _leave_something(search) and not search.instead():
         together(search, leading, postponed)
 

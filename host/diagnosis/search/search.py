@@ -84,7 +84,9 @@ class Search:
             self.on_progress("settling")
             settled = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
             found = self._settled(min(settled, key=lambda e: e.bic))
-            return found if self.part is not None else told_by_the_usual(self, whole(self, found))
+            if self.part is None:
+                return told_by_the_usual(self, whole(self, found))
+            return self._with_what_a_part_hid(found)
         if self.outset is not None and goes_on_from(self, self.outset):
             found = self._concluded()
             if min(e.bic for e in self.singles()) > found.bic + ROUGH:  # else many may do one's work
@@ -119,6 +121,13 @@ class Search:
         found = self._settled(with_best_offsets(self))
         best = with_one_offset(self, told_by_the_usual(self, whole(self, completed(self, found))))
         return with_offsets_asked_again(self, best, best is not found)
+
+    def _with_what_a_part_hid(self, found: Explanation) -> Explanation:
+        """A set of few with what only all of the recordings show, settled again."""
+        if len(found.names) > LARGEST_SET or found.fit.has_process_noise:
+            return found
+        more = with_more(self, found, least=0.0)
+        return found if more is found else self._settled(more)
 
     def singles(self) -> list[Explanation]:
         """Each effect alone on top of the root; what else may change, where the likeliest is a change."""

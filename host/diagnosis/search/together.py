@@ -80,9 +80,9 @@ def together(search: "Search", leading: Explanation, joint: Explanation) -> Expl
         # What drifts can make up for a hull in another valley than the truth.
         if fitter.excess(end.fit) < LITTLE:
             search.adrift = None
-        if search.adrift is None:
+        if search.adrift is None and not search.is_led_elsewhere:
             best = with_more(search, min(end, best, key=lambda e: e.bic))
-    if search.adrift is not None:
+    if search.is_led_elsewhere:
         return None
     if fitter.excess(best.fit) > LITTLE and is_above_floor(fitter, best.fit):
         is_out_of_reach = fitter.excess(best.fit) < MUCH and is_far(fitter, leading)
