@@ -42,6 +42,7 @@ SHARES = (1.0, 0.5, 0.2)  # of a step, until it leads down
 SLIGHT = 2.0  # of a deviance: less is not worth another round
 SHIFT = 0.1  # of the time between two readings, over which a difference is taken
 SCATTERED = 0.15  # deviation of moments from one another: half that of any from 0 to 1
+RUN_AWAY = 1e3  # rad or m, that a step at another moment would do
 TINY = 1e-9  # of a moment, so that its bounds lie apart
 RIDGE = 1e-9  # of the information: what two coefficients do alike
 
@@ -209,6 +210,8 @@ def _with_doubt(unseen: UnseenSteps, moved: Moved) -> list[Recording]:
     deviations = np.sqrt(unseen.variance)[:, None, None]
     runs = zip(owners, moved.fitter.recordings, _residuals(unseen, moved), strict=True)
     for i, run, (_, _, shifts) in runs:
+        if not np.abs(shifts).max(initial=0.0) < RUN_AWAY:
+            return recordings  # no hull that is unstable tells how far another moment would lead it
         rows = np.searchsorted(recordings[i].time, run.time)
         doubts[i][:, :, rows] = deviations * shifts.transpose(1, 0, 2)
     return [

@@ -81,6 +81,20 @@ def test_where_the_vehicle_runs_away_no_step_leads_anywhere(monkeypatch: pytest.
     assert aim.charge == 0.0
 
 
+@pytest.mark.parametrize("by", [np.nan, np.inf, 1e200])
+def test_where_another_moment_leads_it_away_none_is_doubted(
+    by: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = [read_every(hidden_dive(duration=40.0), 5)]
+    unseen = UnseenSteps(seen)
+    moved = plane_moments._anew(unseen, unseen.mean)
+    away = [(np.zeros((2, 3)), np.zeros((2, 9, 3)), np.full((2, len(unseen.mean), 3), by))]
+    monkeypatch.setattr(plane_moments, "_residuals", lambda *_: away)
+    (told,) = plane_moments._with_doubt(unseen, moved)
+    assert told.plane_doubt is None
+    assert np.array_equal(told.rudder, unseen.moved(moved.moments)[0].rudder)
+
+
 def test_stretches_have_their_part_of_the_doubt() -> None:
     (moved,) = with_plane_moments([read_every(hidden_dive(), 5)])
     part = moved.between(20.0, 30.0)

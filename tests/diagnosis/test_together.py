@@ -40,6 +40,7 @@ class Rounds:
         self.leading = SimpleNamespace(names=frozenset({0}), fit=20.0, bic=0.0)
         self.continued = 0
         self.asks_drift, self.adrift, self.is_second = False, None, False
+        self.is_led_by_forces = False
         patch.setattr(module, "_in_one_fit", lambda *_: None)
         patch.setattr(module, "with_ordinary", lambda search, _: search.sets[0])
         patch.setattr(module, "_among_look_alikes", lambda _, best: best)
@@ -49,6 +50,10 @@ class Rounds:
         patch.setattr(module, "pruned", lambda _, best: best)
         patch.setattr(module, "_was_joint", lambda *_: False)
         patch.setattr(module, "is_above_floor", lambda *_: is_above_floor)
+
+    @property
+    def is_led_elsewhere(self) -> bool:
+        return self.is_led_by_forces or self.adrift is not None
 
     def on_progress(self, _: str) -> None: ...
 
