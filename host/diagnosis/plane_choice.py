@@ -13,6 +13,7 @@ from host.diagnosis.fits.sea_fits import as_filtered, with_waves
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.recordings.spans import divide, excerpt
 from host.diagnosis.search.apart import NOTHING, stretches_apart
+from host.diagnosis.search.led_by_filter import led_by_a_filter
 from host.diagnosis.search.outset import (
     at_the_outset,
     beside_what_leads,
@@ -104,6 +105,8 @@ def likelier_first(
     if seen := _among_waves(found):
         on_progress("what every vehicle has, in the waves")
         return _in_a_swell(seen, whole)
+    if whole is not None and (led := _led_by_a_filter([leading, *others], whole, on_progress, jobs)):
+        return led
     begun, leads = [leading, *others], whole is not None and leads_on(leading.fitter, whole)
     if whole is not None and leads:
         seen_by_all = _as_seen_by(begun, leading.fitter.polished(whole))
@@ -161,6 +164,19 @@ def _led_by_short_runs(
     if pushed is None:
         return []
     return [way._replace(pushed=own, calm=whole) for way, own in _as_seen_by(found, pushed)]
+
+
+def _led_by_a_filter(
+    found: list[Way], whole: Explanation, on_progress: Callable[[str], None], jobs: int
+) -> list[Way]:
+    """The ways as a filter sees them that follows a vehicle which no free run does."""
+    fitter = found[0].fitter
+    with Workers(fitter, jobs) as workers:
+        search = Search(fitter, workers, on_progress, fitter.base, fitter.root)
+        led = led_by_a_filter(search, whole)
+    return (
+        [] if led is None else [way._replace(pushed=own, calm=whole) for way, own in _as_seen_by(found, led)]
+    )
 
 
 def _pushed_about(
