@@ -2,7 +2,7 @@
 
 Most torpedoes are, a little: what an autopilot holds within a degree a free run leaves within half a minute,
 whatever its coefficients, and what fits free runs is no hull. Under random forces that are let go in stages
-(host.diagnosis.search.continuation) the likeliest stage tells its coefficients, and whether anything else acts.
+(host.diagnosis.search.continuation) the likeliest stage tells the coefficients, and whether more acts.
 """
 
 from typing import TYPE_CHECKING
