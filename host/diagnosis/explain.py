@@ -75,7 +75,9 @@ def explain(
         swung = plain.instead_of(best)
         if swung is not None and swung.left.is_nothing:
             return swung
-    known, best = best, _beside_what_is_unknown(search, best)
+    known = best
+    if not way.apart or fitter.excess(best.fit) > LITTLE:  # a turn dies away beyond what was left out of it
+        best = _beside_what_is_unknown(search, best)
     if may_be_sea and (unknown_in(best) or not leftover(fitter, best).is_nothing):
         may_swing = part is None or part.waves is not None
         return _in_disturbed_water(search, known, best, plain, drift, may_swing)

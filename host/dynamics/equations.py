@@ -219,6 +219,12 @@ class Structure:
         own = [effect.state for effect in self.effects if effect.actuator is not None]
         return tuple(k for k, name in enumerate(self.states) if name in own)
 
+    @cached_property
+    def of_the_drive(self) -> tuple[int, ...]:
+        """Places among the parameters of those that the plane's angle depends on."""
+        own = [p.name for effect in self.effects if effect.slot == "actuator" for p in effect.parameters]
+        return tuple(k for k, name in enumerate(self.names) if name in own)
+
     @property
     def needs_lags(self) -> bool:
         return any(effect.lags for effect in self.effects)

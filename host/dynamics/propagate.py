@@ -304,20 +304,21 @@ def led_in(form: Form, initial: Array, values: Array, before: Array) -> Array:
 
     Side by side, (actuators, 1 + parameters + 5), as all states at the first row.
     """
-    servos = list(form.structure.servos)
+    servos, columns = list(form.structure.servos), [0, *(1 + k for k in form.structure.of_the_drive)]
     settled = _initial(form)(initial, values, before[:, 0])[servos]
-    led = over_rows(_led, form, before.shape[1])(settled[:, : 1 + form.np].T.ravel(), before, values)[:, -1]
-    settled[:, : 1 + form.np] = led.reshape((-1, len(servos))).T
+    begun = settled[:, columns].T.ravel()
+    led = over_rows(_led, form, before.shape[1])(begun, before, values)[:, -1]
+    settled[:, columns] = led.reshape((-1, len(servos))).T
     return settled
 
 
 @lru_cache(KEPT)
 def _led(form: Form) -> ca.Function:
-    """The actuators over one row, and their slopes by the parameters, S' = F_x S + F_p."""
+    """The actuators over one row, and their slopes by the drive's own parameters, S' = F_x S + F_p."""
     _, p, drive = form.symbols()
-    servos = form.structure.servos
+    servos, own = form.structure.servos, list(form.structure.of_the_drive)
     held = ca.SX.sym("held", len(servos))
-    S = ca.SX.sym("S", len(servos), form.np)
+    S = ca.SX.sym("S", len(servos), len(own))
     after = held
     for k in range(form.substeps):
         x = ca.SX(form.nx, 1)
@@ -325,7 +326,7 @@ def _led(form: Form) -> ca.Function:
         chain = form.structure.chain(x, p, drive, drive[4] + k * drive[3] / form.substeps)
         moved = form.structure.actuate(chain, drive[3] / form.substeps)
         after = ca.vertcat(*(moved[form.structure.states[place]] for place in servos))
-    slopes = ca.jacobian(after, held) @ S + ca.jacobian(after, p)
+    slopes = ca.jacobian(after, held) @ S + ca.jacobian(after, p)[:, own]
     carried, on = ca.vertcat(held, ca.vec(S)), ca.densify(ca.vertcat(after, ca.vec(slopes)))
     return ca.Function("led", [carried, drive, p], [on, on])
 
@@ -337,17 +338,19 @@ class Run:
     states   (nx, N)
     outputs  (2, N) pitch and depth
     within   (substeps, nx, N) states from which the sub-steps begin
+    begun    (nx, parameters + 5) slopes of the first state by the parameters and by what the run began with
     """
 
     states: Array
     outputs: Array
     within: Array
+    begun: Array
 
 
 def free_run(parameters: Array, initial: Array, inputs: Inputs) -> Run:
     """Simulates from [w, q, theta, zeta, u / u0 - 1] (5,) at the first row, blind to the measurements."""
     form = form_of(inputs)
-    start, _ = start_of(form, parameters, initial, inputs)
+    start, begun = start_of(form, parameters, initial, inputs)
     table = over_rows(_free_run, form, inputs.drive.shape[1])(start, inputs.drive, inputs.widened(parameters))
     within = table[:-2].reshape((form.substeps, form.nx, -1))
-    return Run(states=within[0], outputs=table[-2:], within=within)
+    return Run(states=within[0], outputs=table[-2:], within=within, begun=begun)

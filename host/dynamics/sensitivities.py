@@ -37,30 +37,28 @@ def innovations(
         run = steered_run(parameters, initial, inputs, gains)
     with np.errstate(over="ignore", invalid="ignore"):
         error = inputs.present * (inputs.measured - run.outputs)
-    return error, sensitivities(parameters, initial, inputs, run, gains)
+    return error, sensitivities(parameters, inputs, run, gains)
 
 
-def sensitivities(
-    parameters: Array, initial: Array, inputs: Inputs, run: Run, gains: Array | None = None
-) -> Array:
+def sensitivities(parameters: Array, inputs: Inputs, run: Run, gains: Array | None = None) -> Array:
     """Sensitivities (2, parameters + 5, N) of a run's outputs, 0 where nothing was measured."""
     form = form_of(inputs)
-    _, start = start_of(form, parameters, initial, inputs)
     with np.errstate(all="ignore"):  # a run that leaves the numbers is seen by its size
         values = inputs.widened(parameters)
-        passage = Passage(run.states, run.within, values, inputs.drive, start, inputs.present, gains)
+        passage = Passage(run.states, run.within, values, inputs.drive, run.begun, inputs.present, gains)
         return _carried(form, inputs.own)(passage)
 
 
 def steered_run(parameters: Array, initial: Array, inputs: Inputs, gains: Array) -> Run:
     """The run that follows the measurements with given gains."""
     form = form_of(inputs)
-    start, _ = start_of(form, parameters, initial, inputs)
+    start, begun = start_of(form, parameters, initial, inputs)
     per_step = np.vstack([inputs.drive, inputs.measured, gains])
     steered = over_rows(_steered_step, form, inputs.drive.shape[1])
     table = steered(start, per_step, inputs.widened(parameters))
     states, outputs, within = np.split(table, [form.nx, form.nx + 2])
-    return Run(states=states, outputs=outputs, within=within.reshape((form.substeps, form.nx, -1)))
+    within = within.reshape((form.substeps, form.nx, -1))
+    return Run(states=states, outputs=outputs, within=within, begun=begun)
 
 
 @lru_cache(KEPT)

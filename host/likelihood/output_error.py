@@ -160,12 +160,12 @@ def _whitened(values: Array, inputs: Inputs) -> Array:
 
 
 def _innovations(point: Point, runs: list[Run], inputs: list[Inputs]) -> list[tuple[Array, Array]]:
-    each = list(zip(_errors(runs, inputs), runs, point.initial, inputs, strict=True))
+    each = list(zip(_errors(runs, inputs), runs, inputs, strict=True))
     return side_by_side(lambda one: _innovation(point, *one), each)
 
 
-def _innovation(point: Point, error: Array, run: Run, initial: Array, inputs: Inputs) -> tuple[Array, Array]:
-    return error, _whitened(sensitivities(point.parameters, initial, inputs, run), inputs)
+def _innovation(point: Point, error: Array, run: Run, inputs: Inputs) -> tuple[Array, Array]:
+    return error, _whitened(sensitivities(point.parameters, inputs, run), inputs)
 
 
 def _whitened_by(
