@@ -1,5 +1,6 @@
 """All that every vehicle has at once: where the search begins with it, and where with single effects."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -17,7 +18,7 @@ from host.diagnosis import plane_choice
 from host.diagnosis.diagnose import diagnose
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
-from host.diagnosis.fits.margins import LITTLE, MUCH
+from host.diagnosis.fits.margins import LITTLE, MUCH, ROUGH
 from host.diagnosis.fits.trims import retrimmed
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.plane_choice import Way, likelier_first
@@ -295,6 +296,7 @@ def test_a_search_goes_on_with_many_or_begins_with_single_effects(
     calls: list[str] = []
     monkeypatch.setattr(outset, "_with_a_form", lambda _, whole: found(whole.names, with_form))
     monkeypatch.setattr(outset, "with_more", lambda _, best, **__: best)
+    monkeypatch.setattr(outset, "_in_another_valley", lambda *_: None)
     monkeypatch.setattr(outset, "pruned", lambda *_: found(pays))
     monkeypatch.setattr(module, "beam_search", lambda _: calls.append("singles"))
     monkeypatch.setattr(Search, "_concluded", lambda _: calls.append("concluded") or found(MANY))
@@ -310,6 +312,40 @@ def test_a_search_goes_on_with_many_or_begins_with_single_effects(
         single.bic = left + 59.0  # by its rough fit; many may do the work of one
         search.run()
         assert calls[1:] == ["concluded", "singles", "concluded"]
+
+
+def test_what_is_lacking_may_join_in_the_other_valley_of_a_lag_and_a_pole(
+    real: Fitter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The likelier one lacks more: there nothing joins that leaves as little."""
+    here, there, end = (
+        SimpleNamespace(names=MANY, bic=bic, leaves_white=True) for bic in (-100.0, -80.0, -150.0)
+    )
+    monkeypatch.setattr(outset, "_in_another_valley", lambda *_: there)
+    monkeypatch.setattr(outset, "with_more", lambda _, best, **__: end if best is there else best)
+    asked: list[Any] = []
+    monkeypatch.setattr(outset, "pruned", lambda _, one: asked.append(one) or one)
+    monkeypatch.setattr(outset, "_is_of_a_hull", lambda _: True)
+    search = Search(real, cast("Any", None), lambda _: None, real.base, real.root)
+    monkeypatch.setattr(Search, "remember", lambda _, one: one)
+    assert outset.goes_on_from(search, cast("Any", here))
+    assert asked == [end]
+
+
+def test_another_valley_is_as_likely_and_apart(real: Fitter, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = at_the_outset(real)
+    assert whole is not None
+    far = replace(whole, bic=whole.bic + ROUGH + 1.0)
+    near = replace(whole, bic=whole.bic + 1.0)
+    search = Search(real, Workers(real, 1), lambda _: None, real.base, real.root)
+    monkeypatch.setattr(outset, "are_apart", lambda *_: True)
+    monkeypatch.setattr(Fitter, "polished", lambda _, one: one)
+    ends = iter([far, near, far])
+    monkeypatch.setattr(outset, "look_alikes", lambda _: [1, 2, 3])
+    monkeypatch.setattr(Fitter, "entered", lambda *_: next(ends))
+    assert outset._in_another_valley(search, whole) is near
+    ends = iter([far, far, far])
+    assert outset._in_another_valley(search, whole) is None
 
 
 @pytest.mark.parametrize("is_white", [True, False])
@@ -347,6 +383,11 @@ def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(plane_choice, "_in_a_swell", lambda seen, _: seen)
     assert [each.outset for each in likelier_first([moved, held], lambda _: None, 1)] == [None, None]
     monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)
+    led: Any = SimpleNamespace(bic=-40.0)
+    monkeypatch.setattr(plane_choice, "_pushed_about", lambda *_: pytest.fail("asked of what a filter leads"))
+    monkeypatch.setattr(plane_choice, "_led_by_a_filter", lambda ways, *_: [ways[0]._replace(pushed=led)])
+    assert likelier_first([moved, held], lambda _: None, 1)[0].pushed is led
+    monkeypatch.setattr(plane_choice, "_led_by_a_filter", lambda *_: [])
     monkeypatch.setattr(plane_choice, "_pushed_about", lambda *_: [])
     assert order(moved, held) == [0, 1]
     assert likelier_first([held], lambda _: None, 1)[0].outset is whole

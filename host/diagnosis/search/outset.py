@@ -20,7 +20,7 @@ from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import IN_LAYERS, WANDERING
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import ROUGHLY, Fitter
-from host.diagnosis.fits.margins import LITTLE, MUCH, margin
+from host.diagnosis.fits.margins import LITTLE, MUCH, ROUGH, margin
 from host.diagnosis.fits.prospects import form_gains
 from host.diagnosis.fits.sea_fits import as_filtered, with_sea
 from host.diagnosis.fits.speed_forces import are_by_speed
@@ -33,7 +33,7 @@ from host.diagnosis.search.pruning import pruned
 from host.diagnosis.search.together import with_more
 from host.diagnosis.search.whole_vehicle import all_beside, ended, is_real
 from host.likelihood.gauss_newton import Point
-from host.likelihood.valleys import has_usual_heave
+from host.likelihood.valleys import are_apart, has_usual_heave, look_alikes
 
 if TYPE_CHECKING:
     from host.diagnosis.search.search import Search
@@ -213,6 +213,8 @@ def goes_on_from(search: "Search", joint: Explanation) -> bool:
     search.on_progress("what every vehicle has")
     search.joint.add(joint.names)
     more = with_more(search, search.remember(joint), least=0.0)
+    if (other := _in_another_valley(search, joint)) is not None:
+        more = min(more, with_more(search, other, least=0.0), key=lambda e: e.bic)
     if not (more.leaves_white or search.fitter.excess(more.fit) < LITTLE):
         more = min(more, _with_a_form(search, joint), key=lambda e: e.bic)
     is_all = more.leaves_white or search.fitter.excess(more.fit) < LITTLE
@@ -220,6 +222,18 @@ def goes_on_from(search: "Search", joint: Explanation) -> bool:
         return True
     search.joint.clear()  # beside what the search finds they are tried again
     return False
+
+
+def _in_another_valley(search: "Search", whole: Explanation) -> Explanation | None:
+    """The same where a lag and a pole of the hull have traded places, if about as likely; else None.
+
+    What is still lacking may be all that makes the wrong one likelier, and from there no exchange comes back.
+    """
+    fit, known = whole.fit, whole.lean()
+    here = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+    found = search.workers.results([(Fitter.entered, (start, known)) for start in look_alikes(here)])
+    near = [one for one in found if one.bic < whole.bic + ROUGH and are_apart(one.fit, fit)]
+    return search.fitter.polished(min(near, key=lambda e: e.bic)) if near else None
 
 
 def _is_of_a_hull(found: Explanation) -> bool:
