@@ -335,16 +335,18 @@ def test_what_is_lacking_may_join_in_the_other_valley_of_a_lag_and_a_pole(
 def test_another_valley_is_as_likely_and_apart(real: Fitter, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = at_the_outset(real)
     assert whole is not None
-    far = replace(whole, bic=whole.bic + ROUGH + 1.0)
+    far = replace(whole, bic=whole.bic + 2.0 * ROUGH + 1.0)
     near = replace(whole, bic=whole.bic + 1.0)
     search = Search(real, Workers(real, 1), lambda _: None, real.base, real.root)
-    monkeypatch.setattr(outset, "are_apart", lambda *_: True)
+    a2 = whole.fit.structure.names.index("a2")
+    traded = whole.fit.parameters * np.where(np.arange(whole.fit.parameters.size) == a2, 2.5, 1.0)
+    same, near = near, replace(near, fit=replace(near.fit, parameters=traded))
     monkeypatch.setattr(Fitter, "polished", lambda _, one: one)
-    ends = iter([far, near, far])
+    ends = iter([far, near, same])
     monkeypatch.setattr(outset, "look_alikes", lambda _: [1, 2, 3])
     monkeypatch.setattr(Fitter, "entered", lambda *_: next(ends))
     assert outset._in_another_valley(search, whole) is near
-    ends = iter([far, far, far])
+    ends = iter([far, same, far])
     assert outset._in_another_valley(search, whole) is None
 
 

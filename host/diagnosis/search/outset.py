@@ -32,8 +32,9 @@ from host.diagnosis.search.lone_form import likely_forms
 from host.diagnosis.search.pruning import pruned
 from host.diagnosis.search.together import with_more
 from host.diagnosis.search.whole_vehicle import all_beside, ended, is_real
+from host.likelihood.fit import Fit
 from host.likelihood.gauss_newton import Point
-from host.likelihood.valleys import are_apart, has_usual_heave, look_alikes
+from host.likelihood.valleys import A1, A2, has_usual_heave, look_alikes
 
 if TYPE_CHECKING:
     from host.diagnosis.search.search import Search
@@ -45,6 +46,7 @@ MOST_FORCES = 0.1  # of the variance of all force: what acts is known but for a 
 FAR_LIKELIER = 0.1  # of BIC a sample, under random forces
 FAIR_PART = 0.02  # of what these explain, that what is missing should gain even beside them
 TURNING = ("munk_moment", "heave_pitch_rate_coupling")
+TRADED, TINY = 2.0, 1e-6  # times a damping: it is a pole of something else
 LEADING = 3  # of what may lead, beside which all the rest is tried
 IN_TIME = ("surface_waves", "internal_wave", "unknown_swinging_moment", *sorted(WANDERING))
 """What swings with one period, or wanders. Of a sea it follows a part: little must be left beside it."""
@@ -232,8 +234,14 @@ def _in_another_valley(search: "Search", whole: Explanation) -> Explanation | No
     fit, known = whole.fit, whole.lean()
     here = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
     found = search.workers.results([(Fitter.entered, (start, known)) for start in look_alikes(here)])
-    near = [one for one in found if one.bic < whole.bic + ROUGH and are_apart(one.fit, fit)]
+    near = [one for one in found if one.bic < whole.bic + 2.0 * ROUGH and _have_traded(one.fit, fit)]
     return search.fitter.polished(min(near, key=lambda e: e.bic)) if near else None
+
+
+def _have_traded(one: Fit, other: Fit) -> bool:
+    """Whether a damping of the one hull is another than that of the other: ends along a ridge share it."""
+    ratios = one.parameters[[A1, A2]] / other.parameters[[A1, A2]]
+    return bool((np.abs(np.log(np.maximum(ratios, TINY))) > np.log(TRADED)).any())
 
 
 def _is_of_a_hull(found: Explanation) -> bool:
