@@ -24,6 +24,8 @@ from host.diagnosis.search.outset import (
 from host.diagnosis.search.search import Search
 from host.diagnosis.search.short_runs import ShortRuns, followed_shortly, short_runs
 from host.diagnosis.search.whole_vehicle import is_real, with_all_ordinary
+from host.likelihood.gauss_newton import Point
+from host.likelihood.valleys import look_alikes
 from host.recordings.left_out import Span, without
 from host.recordings.plane_between_rows import ways_between
 from host.recordings.recording import Recording
@@ -118,8 +120,18 @@ def likelier_first(
 
 def _as_seen_by(found: list[Way], one: Explanation) -> list[tuple[Way, Explanation]]:
     """The ways, the likelier first, as a set sees them that was fitted to the first; with each its own."""
-    sets = [one, *(way.fitter.reduced(one, one.names) for way in found[1:])]
+    sets = [one, *(_taken_so(way.fitter, one) for way in found[1:])]
     return sorted(zip(found, sets, strict=True), key=lambda pair: pair[1].bic)
+
+
+def _taken_so(fitter: Fitter, one: Explanation) -> Explanation:
+    """A set that was fitted to the plane taken another way, in the likelier valley: a lag may do for that."""
+    here = fitter.reduced(one, one.names)
+    if one.fit.has_process_noise:
+        return here
+    fit = here.fit
+    starts = look_alikes(Point(fit.structure, fit.parameters, fit.initial, fit.noise))
+    return min([here, *(fitter.entered(start, here) for start in starts)], key=lambda e: e.bic)
 
 
 def _among_waves(found: list[Way]) -> list[Way]:

@@ -364,13 +364,14 @@ def test_a_form_beside_all_that_every_vehicle_has_must_leave_white_noise(
 def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> None:
     def way(root: float, there: float) -> Way:
         fitter = SimpleNamespace(root=SimpleNamespace(bic=root, fit=2.0 * MUCH), excess=lambda fit: fit)
-        fitter.reduced, fitter.polished = lambda *_: SimpleNamespace(bic=there), lambda one: one
+        fitter.there, fitter.polished = SimpleNamespace(bic=there), lambda one: one
         return Way([], cast("Any", fitter))
 
     def order(*found: Way) -> list[int]:
         told = likelier_first([*found], lambda _: None, 1)
         return [[each.fitter for each in found].index(each.fitter) for each in told]
 
+    monkeypatch.setattr(plane_choice, "_taken_so", lambda fitter, _: fitter.there)
     whole: Any = SimpleNamespace(bic=-10.0, names=MANY, leaves_white=True, fit=0.1)
     held, moved, worse = way(-2.0, np.nan), way(-1.0, -11.0), way(-1.0, -9.0)
     monkeypatch.setattr(plane_choice, "at_the_outset", lambda *_: whole)
