@@ -10,6 +10,7 @@ from host.diagnosis import explain as module
 from host.diagnosis.disturbances.seas import Explained
 from host.diagnosis.explain import _alike, _many_in
 from host.diagnosis.fits.margins import LARGEST_SET, LITTLE
+from host.diagnosis.plane_choice import Way
 from host.diagnosis.search.beam import _is_explained_otherwise, _needs_many
 from host.diagnosis.search.search import Search
 
@@ -75,6 +76,8 @@ def explained(
     waves: Any = None,
     led: Any = None,
     needs_many: bool = False,
+    apart: tuple[tuple[float, float], ...] = (),
+    excess: float = 2.0,
 ) -> Any:
     """What `explain` makes of a search that finds this, and whether that was for few effects, if it asked."""
     was_for_few = []
@@ -89,8 +92,8 @@ def explained(
     monkeypatch.setattr(module, "led_astray", lambda *_: led)
     monkeypatch.setattr(module, "unknown_in", lambda one: [n for n in one.names if n.startswith("unknown_")])
     monkeypatch.setattr(module, "leanest", lambda _, best: best)
-    fitter: Any = SimpleNamespace(base=None, root=None)
-    way: Any = SimpleNamespace(waves=waves, outset=None, swell=None, calm=None, pushed=None, alone=())
+    fitter: Any = SimpleNamespace(base=None, root=None, excess=lambda _: excess)
+    way = Way([], fitter, waves=waves, apart=apart)
     return module.explain(fitter, cast("Any", None), lambda _: None, way), was_for_few
 
 
@@ -151,6 +154,19 @@ def test_no_form_of_unknown_physics_is_asked_where_no_free_run_comes_near(
     answer, _ = explained(monkeypatch, ORDINARY_SET, left=MUCH_LEFT)
     assert answer.best is RARE_SET
     assert asked == ([] if is_pushed else [ORDINARY_SET])
+
+
+@pytest.mark.parametrize(("excess", "is_asked"), [(1.1, False), (1.3, True)])
+def test_what_remains_of_turns_is_no_physics_outside_the_catalogue(
+    excess: float, is_asked: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+    monkeypatch.setattr(module, "with_unknown", lambda _, best: asked.append(best) or best)
+    monkeypatch.setattr(module, "in_a_sea", lambda search, best: (search, best))
+    monkeypatch.setattr(module, "among_waves", lambda search, best, _: (search, best, None))
+    monkeypatch.setattr(module, "among_drift", lambda *_: None)
+    explained(monkeypatch, ORDINARY_SET, left=MUCH_LEFT, apart=((75.0, 125.0),), excess=excess)
+    assert bool(asked) is is_asked
 
 
 @pytest.mark.parametrize(
