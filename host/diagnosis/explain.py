@@ -137,11 +137,9 @@ def _led_astray(search: Search, best: Explanation) -> Explained | None:
         return None
     left = leftover(search.fitter, led[1])
     is_led = search.follows_no_free_run or left.is_nothing
-    return (
-        Explained(led[1], led[0], left, None)
-        if is_led and not _does_a_form_more(search, best, led[1])
-        else None
-    )
+    if not is_led or _does_a_form_more(search, best, led[1]):
+        return None
+    return Explained(led[1], led[0], left, None)
 
 
 def _does_a_form_more(search: Search, best: Explanation, led: Explanation) -> bool:

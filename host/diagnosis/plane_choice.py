@@ -186,9 +186,9 @@ def _led_by_a_filter(
     with Workers(fitter, jobs) as workers:
         search = Search(fitter, workers, on_progress, fitter.base, fitter.root)
         led = led_by_a_filter(search, whole)
-    return (
-        [] if led is None else [way._replace(pushed=own, calm=whole) for way, own in _as_seen_by(found, led)]
-    )
+    if led is None:
+        return []
+    return [way._replace(pushed=own, calm=whole) for way, own in _as_seen_by(found, led)]
 
 
 def _pushed_about(

@@ -112,5 +112,6 @@ def test_what_goes_with_the_depth_is_drawn_over_it(coupled: Diagnosis) -> None:
     dive = hidden_dive(lambda _, x, __: (0.1 * np.tanh(x[3] - 15.0), 0.0, 0.0), duration=60.0)
     fitter = Fitter([dive])
     layered = fitter.grown(fitter.root, "unknown_force_in_layers", [])
-    picture = layers_picture(replace(coupled, recordings=[dive], extended=layered))
+    seldom = replace(dive, depth=np.where(np.arange(dive.time.size) % 2 == 0, dive.depth, np.nan))
+    picture = layers_picture(replace(coupled, recordings=[seldom], extended=layered))
     assert picture.startswith("data:image/png;base64,")

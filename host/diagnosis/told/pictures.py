@@ -184,6 +184,7 @@ def layers_picture(found: Diagnosis) -> str:
     spread = covariance(fit)
     values = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
     dwelt = np.concatenate([recording.depth for recording in found.recordings])
+    dwelt = dwelt[np.isfinite(dwelt)]
     figure, axes = plt.subplots(
         1, len(forms) + 1, figsize=(9.5, 3.4), sharey=True, width_ratios=[*(2.4 for _ in forms), 1.0]
     )
