@@ -16,7 +16,8 @@ import numpy as np
 from host.compiled.all_rows import AllRows
 from host.compiled.carried_slopes import CarriedSlopes, Passage
 from host.compiled.over_rows import KEPT, over_rows
-from host.dynamics.propagate import Form, Inputs, Run, form_of, free_run, start_of
+from host.dynamics.form import Form
+from host.dynamics.propagate import Inputs, Run, form_of, free_run, start_of
 from host.dynamics.substep_slopes import substep_slopes
 from host.recordings.recording import Array
 

@@ -14,7 +14,7 @@ from functools import lru_cache
 import casadi as ca
 
 from host.compiled.over_rows import KEPT
-from host.dynamics.propagate import Form, slope_of
+from host.dynamics.form import Form, slope_of
 
 
 class _Stages:

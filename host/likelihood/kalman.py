@@ -8,7 +8,8 @@ import numpy as np
 
 from host.compiled.over_rows import KEPT, over_rows
 from host.dynamics.equations import Structure
-from host.dynamics.propagate import Form, Inputs, form_of, start_of
+from host.dynamics.form import Form
+from host.dynamics.propagate import Inputs, form_of, start_of
 from host.recordings.recording import Array
 
 
