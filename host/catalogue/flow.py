@@ -71,7 +71,11 @@ EFFECTS = (
         slot="actuator",
         parameters=(
             Parameter(
-                name="fin_stall_angle", unit="rad", lower=0.05, upper=1.5, meaning="half is lost there"
+                name="fin_stall_angle",
+                unit="rad",
+                lower=0.05,
+                upper=1.5,
+                meaning="half of it is lost there",
             ),
             Parameter(
                 name="fin_stall_loss", unit="1", lower=0, upper=1, meaning="share of lift, lost far beyond"
@@ -79,7 +83,7 @@ EFFECTS = (
             Parameter(name="fin_arm", unit="m", lower=0.05, upper=10, meaning="from the middle to the fins"),
         ),
         sentence="The fins stall by the angle at which they meet the flow, of which the plane is a part.",
-        equation="w' = ... - b1 L u^2, q' = ... - b2 L u^2, L = fin_stall_loss alpha r/(1 + r), "
+        equation="w' = ... - b1 L, q' = ... - b2 L, L = (u/u0)^2 fin_stall_loss alpha r/(1 + r), "
         "r = (alpha/fin_stall_angle)^2, alpha = delta - sign(b2) (w + fin_arm q)/u",
         manoeuvre="full plane reversals, during which the hull heaves and turns most",
         probes=((0.4, 0.5, 1.0), (0.5, 1.0, 0.4), (0.5, 1.0, 2.0)),

@@ -11,15 +11,15 @@ enum {
 };
 
 /* A result may take the place of its own operand, row by row, which the compiler cannot know. */
-#define EACH(value)                                 \
-    {                                               \
-        _Pragma("omp simd")                         \
-        for (int k = 0; k < BLOCK; k++) {           \
-            const double x = a[k], y = b[k], w = c[k];\
-            (void)y, (void)w;                       \
-            z[k] = value;                           \
-        }                                           \
-        break;                                      \
+#define EACH(value)                                   \
+    {                                                 \
+        _Pragma("omp simd")                           \
+        for (int k = 0; k < BLOCK; k++) {             \
+            const double x = a[k], y = b[k], w = c[k]; \
+            (void)y, (void)w;                         \
+            z[k] = value;                             \
+        }                                             \
+        break;                                        \
     }
 
 /* Instructions (operation, three operands, place) and what they are given.

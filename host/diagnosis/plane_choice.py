@@ -1,6 +1,7 @@
 """Whether a plane held its angles between rows or moved on (host.recordings.plane_between_rows)."""
 
 from collections.abc import Callable
+from functools import partial
 from math import inf
 from typing import NamedTuple
 
@@ -22,9 +23,8 @@ from host.diagnosis.search.outset import (
     says_all,
 )
 from host.diagnosis.search.search import Search
-from host.diagnosis.search.short_runs import ShortRuns, followed_shortly, short_runs
+from host.diagnosis.search.short_runs import followed_shortly, short_runs
 from host.diagnosis.search.whole_vehicle import is_real, with_all_ordinary
-from host.likelihood.gauss_newton import Point
 from host.likelihood.valleys import look_alikes
 from host.recordings.left_out import Span, without
 from host.recordings.plane_between_rows import ways_between
@@ -99,16 +99,19 @@ def likelier_first(
             whole = min(whole, leading.fitter.refitted(instead), key=lambda e: e.bic)
             if says_all(leading.fitter, whole):
                 return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
-        followed = _led_by_short_runs([leading, *others], whole, short, on_progress, jobs)
-        if followed:
-            return followed
+        if short is not None:
+            taught = partial(followed_shortly, whole=whole, short=short)
+            if led := _led([leading, *others], whole, taught, on_progress, jobs):
+                return led
     if whole is not None:
         whole = beside_what_leads(leading.fitter, whole, jobs)
     if seen := _among_waves(found):
         on_progress("what every vehicle has, in the waves")
         return _in_a_swell(seen, whole)
-    if whole is not None and (led := _led_by_a_filter([leading, *others], whole, on_progress, jobs)):
-        return led
+    if whole is not None:
+        filtered = partial(led_by_a_filter, whole=whole)
+        if led := _led([leading, *others], whole, filtered, on_progress, jobs):
+            return led
     begun, leads = [leading, *others], whole is not None and leads_on(leading.fitter, whole)
     if whole is not None and leads:
         seen_by_all = _as_seen_by(begun, leading.fitter.polished(whole))
@@ -129,9 +132,8 @@ def _taken_so(fitter: Fitter, one: Explanation) -> Explanation:
     here = fitter.reduced(one, one.names)
     if one.fit.has_process_noise:
         return here
-    fit = here.fit
-    starts = look_alikes(Point(fit.structure, fit.parameters, fit.initial, fit.noise))
-    return min([here, *(fitter.entered(start, here) for start in starts)], key=lambda e: e.bic)
+    others = (fitter.entered(start, here) for start in look_alikes(here.fit.end))
+    return min([here, *others], key=lambda e: e.bic)
 
 
 def _among_waves(found: list[Way]) -> list[Way]:
@@ -159,36 +161,20 @@ def _in_a_swell(seen: list[Way], whole: Explanation | None) -> list[Way]:
     return [way._replace(swell=own) for way, own in _as_seen_by(begun, swell)]
 
 
-def _led_by_short_runs(
+def _led(
     found: list[Way],
     whole: Explanation,
-    short: ShortRuns | None,
+    lead: Callable[[Search], Explanation | None],
     on_progress: Callable[[str], None],
     jobs: int,
 ) -> list[Way]:
-    """The ways as short runs and slight forces see them, where these explain what no long run follows."""
+    """The ways as what leads a vehicle sees them that no free run follows; none where it leads nowhere."""
     fitter = found[0].fitter
-    if short is None:
-        return []
     with Workers(fitter, jobs) as workers:
-        search = Search(fitter, workers, on_progress, fitter.base, fitter.root)
-        pushed = followed_shortly(search, whole, short)
+        pushed = lead(Search(fitter, workers, on_progress, fitter.base, fitter.root))
     if pushed is None:
         return []
     return [way._replace(pushed=own, calm=whole) for way, own in _as_seen_by(found, pushed)]
-
-
-def _led_by_a_filter(
-    found: list[Way], whole: Explanation, on_progress: Callable[[str], None], jobs: int
-) -> list[Way]:
-    """The ways as a filter sees them that follows a vehicle which no free run does."""
-    fitter = found[0].fitter
-    with Workers(fitter, jobs) as workers:
-        search = Search(fitter, workers, on_progress, fitter.base, fitter.root)
-        led = led_by_a_filter(search, whole)
-    if led is None:
-        return []
-    return [way._replace(pushed=own, calm=whole) for way, own in _as_seen_by(found, led)]
 
 
 def _pushed_about(

@@ -220,10 +220,10 @@ class Structure:
         return tuple(k for k, name in enumerate(self.states) if name in own)
 
     @cached_property
-    def of_the_drive(self) -> tuple[int, ...]:
-        """Places among the parameters of those that the plane's angle depends on."""
-        own = [p.name for effect in self.effects if effect.slot == "actuator" for p in effect.parameters]
-        return tuple(k for k, name in enumerate(self.names) if name in own)
+    def drive(self) -> "Structure":
+        """The same with no more than moves the plane, and where that was before."""
+        own = (e for e in self.effects if e.slot == "actuator" and e.force is None and e.plane is None)
+        return Structure(tuple(own))
 
     @property
     def needs_lags(self) -> bool:

@@ -206,42 +206,40 @@ def begun_at(pitch: float, depth: float) -> Array:
 
 def start_of(form: Form, parameters: Array, initial: Array, inputs: Inputs) -> tuple[Array, Array]:
     """All states at the first row (nx,), and their derivatives by the parameters and by `initial` (5,)."""
-    values = inputs.widened(parameters)
+    values, structure = inputs.widened(parameters), form.structure
     table = _initial(form)(initial, values, inputs.drive[:, 0])
-    if inputs.before.size and (servos := form.structure.servos):
-        table[list(servos)] = led_in(form, initial, values, inputs.before)
+    if inputs.before.size and (servos := structure.servos):
+        of_the_drive = _places(structure.drive.names, structure.names)
+        led = led_in(replace(form, structure=structure.drive), values[list(of_the_drive)], inputs.before)
+        table[np.ix_(servos, [0, *(1 + k for k in of_the_drive)])] = led
     own = [*inputs.own, *range(form.np, form.np + NX0)]
     return table[:, 0].copy(), table[:, 1:][:, own]
 
 
-def led_in(form: Form, initial: Array, values: Array, before: Array) -> Array:
+def led_in(form: Form, values: Array, before: Array) -> Array:
     """Where the rows before the first lead the plane's actuators, settled at the first of these, and slopes.
 
-    Side by side, (actuators, 1 + parameters + 5), as all states at the first row.
+    Side by side, (actuators, 1 + parameters).
     """
-    servos, columns = list(form.structure.servos), [0, *(1 + k for k in form.structure.of_the_drive)]
-    settled = _initial(form)(initial, values, before[:, 0])[servos]
-    begun = settled[:, columns].T.ravel()
-    led = over_rows(_led, form, before.shape[1])(begun, before, values)[:, -1]
-    settled[:, columns] = led.reshape((-1, len(servos))).T
-    return settled
+    servos = list(form.structure.servos)
+    settled = _initial(form)(np.zeros(NX0), values, before[:, 0])[servos, : 1 + form.np]
+    led = over_rows(_led, form, before.shape[1])(settled.T.ravel(), before, values)[:, -1]
+    return led.reshape((-1, len(servos))).T
 
 
 @lru_cache(KEPT)
 def _led(form: Form) -> ca.Function:
-    """The actuators over one row, and their slopes by the drive's own parameters, S' = F_x S + F_p."""
+    """The actuators over one row, and their slopes by the parameters, S' = F_x S + F_p."""
     _, p, drive = form.symbols()
-    servos, own = form.structure.servos, list(form.structure.of_the_drive)
-    held = ca.SX.sym("held", len(servos))
-    S = ca.SX.sym("S", len(servos), len(own))
-    after = held
+    states, servos = form.structure.states, list(form.structure.servos)
+    held, S = ca.SX.sym("held", len(servos)), ca.SX.sym("S", len(servos), form.np)
+    after, h = held, drive[3] / form.substeps
     for k in range(form.substeps):
         x = ca.SX(form.nx, 1)
-        x[list(servos)] = after
-        chain = form.structure.chain(x, p, drive, drive[4] + k * drive[3] / form.substeps)
-        moved = form.structure.actuate(chain, drive[3] / form.substeps)
-        after = ca.vertcat(*(moved[form.structure.states[place]] for place in servos))
-    slopes = ca.jacobian(after, held) @ S + ca.jacobian(after, p)[:, own]
+        x[servos] = after
+        moved = form.structure.actuate(form.structure.chain(x, p, drive, drive[4] + k * h), h)
+        after = ca.vertcat(*(moved[states[place]] for place in servos))
+    slopes = ca.jacobian(after, held) @ S + ca.jacobian(after, p)
     carried, on = ca.vertcat(held, ca.vec(S)), ca.densify(ca.vertcat(after, ca.vec(slopes)))
     return ca.Function("led", [carried, drive, p], [on, on])
 

@@ -63,6 +63,11 @@ class Fit:
         return bool(self.noise[2:].any())
 
     @property
+    def end(self) -> Point:
+        """Where it ended, under its noise without waves."""
+        return Point(self.structure, self.parameters, self.initial, self.noise)
+
+    @property
     def levels(self) -> Array:
         """What a fit that goes on from here starts with: `noise`; in waves (7,) of host.likelihood.waves."""
         return np.concatenate([self.noise[:2], self.waves]) if self.waves.any() else self.noise

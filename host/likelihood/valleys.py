@@ -50,7 +50,7 @@ def other_valleys(fit: Fit, inputs: list[Inputs]) -> list[Fit]:
     Among them may be a likelier one, and the one that the search began with again. Where the speed is held,
     heave damping has one valley.
     """
-    here = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+    here = fit.end
     starts = [(start, fit.free) for start in look_alikes(here)]
     if fit.free[A1] and fit.free[U0]:
         held = fit.free.copy()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hidden_dive import hidden_dive
 
-from host.catalogue import ALONG_THE_HULL, DRIVE, FAINT, ORDINARY
+from host.catalogue import ALONG_THE_HULL, DRIVE, FAINT, ORDINARY, structure_of
 from host.catalogue.kin import OFFSETS
 from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
@@ -34,6 +34,7 @@ from host.diagnosis.search.outset import (
 )
 from host.diagnosis.search.search import Search
 from host.diagnosis.search.whole_vehicle import ended
+from host.likelihood.gauss_newton import Point
 from host.recordings.read import read_recordings
 from host.recordings.recording import Array, Recording
 from host.vehicle import default_vehicle
@@ -288,7 +289,7 @@ def test_a_search_goes_on_with_many_or_begins_with_single_effects(
     def found(names: frozenset[str], left: float = left) -> Any:
         hull = np.array([a1, -3.4, -8.2, 0.4, -3.9, 2.5])
         fit, white = (
-            SimpleNamespace(left=left, structure=None, parameters=hull, initial=[], noise=[]),
+            SimpleNamespace(left=left, end=Point(structure_of(()), hull, [], np.zeros(4))),
             left == 1.3,
         )
         return SimpleNamespace(names=names, bic=left, fit=fit, leaves_white=white, lean=lambda: found(names))
@@ -388,9 +389,9 @@ def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)
     led: Any = SimpleNamespace(bic=-40.0)
     monkeypatch.setattr(plane_choice, "_pushed_about", lambda *_: pytest.fail("asked of what a filter leads"))
-    monkeypatch.setattr(plane_choice, "_led_by_a_filter", lambda ways, *_: [ways[0]._replace(pushed=led)])
+    monkeypatch.setattr(plane_choice, "_led", lambda ways, *_: [ways[0]._replace(pushed=led)])
     assert likelier_first([moved, held], lambda _: None, 1)[0].pushed is led
-    monkeypatch.setattr(plane_choice, "_led_by_a_filter", lambda *_: [])
+    monkeypatch.setattr(plane_choice, "_led", lambda *_: [])
     monkeypatch.setattr(plane_choice, "_pushed_about", lambda *_: [])
     assert order(moved, held) == [0, 1]
     assert likelier_first([held], lambda _: None, 1)[0].outset is whole

@@ -164,7 +164,7 @@ class Fitter(Setting):
         held = np.zeros(start.parameters.size, dtype=bool)
         inputs = self.inputs(explanation.names)
         fit = output_error(start, inputs, held, FIRST_ITERATIONS, TOLERANCE)
-        return scanned(self, Point(fit.structure, fit.parameters, fit.initial, fit.noise))
+        return scanned(self, fit.end)
 
     def carried_over(self, explanation: Explanation) -> Point:
         """The coefficients of a fit to other stretches, with states such as these begin with."""

@@ -33,9 +33,8 @@ def as_filtered(fitter: Fitter, explanation: Explanation) -> Explanation:
     fit = explanation.fit
     if fit.has_process_noise or not fitter.steps.any():
         return explanation
-    start = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
     inputs = fitter.inputs(explanation.names, for_filter=True)
-    return fitter.explained(explanation.names, output_error(start, inputs, fit.free))
+    return fitter.explained(explanation.names, output_error(fit.end, inputs, fit.free))
 
 
 def roughly_with_waves(fitter: Fitter, explanation: Explanation) -> Explanation:

@@ -63,8 +63,7 @@ def starts_again(
     A parent that lacks what joins may have put its poles in each other's place: that is asked of its set,
     too, where much is left.
     """
-    fit = end.fit
-    at = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+    at = end.fit.end
     sharing = at.structure.names if is_far(fitter, end) else (named(name).parameters[0].name,)
     starts = look_alikes(at) if {*SHARING_POLES} & {*sharing} else []
     if not has_usual_heave(at):

@@ -87,7 +87,7 @@ def _distance(
     ahead  (n,) by how much all coefficients move with it at first, its own by 1 or -1
     """
     fit, inputs = explanation.fit, fitter.inputs(explanation.names)
-    point = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+    point = fit.end
     others = fit.free & (np.arange(fit.free.size) != k)
     near, fallen_near, far = 0.0, 0.0, HALF_WIDTH * std
     for _ in range(MOST_STRIDES):

@@ -203,8 +203,7 @@ def _moved(search: "Search", steered: list[Explanation]) -> list[Explanation]:
 
 
 def _at(steered: Explanation) -> Point:
-    fit = steered.fit
-    return Point(fit.structure, fit.parameters, fit.initial, fit.noise)
+    return steered.fit.end
 
 
 def _steered(search: "Search", points: list[Point], steps: int = FEW_STEPS) -> list[Explanation]:

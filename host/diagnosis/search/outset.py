@@ -231,10 +231,9 @@ def _in_another_valley(search: "Search", whole: Explanation) -> Explanation | No
 
     What is still lacking may be all that makes the wrong one likelier, and from there no exchange comes back.
     """
-    fit, known = whole.fit, whole.lean()
-    here = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
-    found = search.workers.results([(Fitter.entered, (start, known)) for start in look_alikes(here)])
-    near = [one for one in found if one.bic < whole.bic + 2.0 * ROUGH and _have_traded(one.fit, fit)]
+    known = whole.lean()
+    found = search.workers.results([(Fitter.entered, (at, known)) for at in look_alikes(whole.fit.end)])
+    near = [one for one in found if one.bic < whole.bic + 2.0 * ROUGH and _have_traded(one.fit, whole.fit)]
     return search.fitter.polished(min(near, key=lambda e: e.bic)) if near else None
 
 
@@ -246,9 +245,7 @@ def _have_traded(one: Fit, other: Fit) -> bool:
 
 def _is_of_a_hull(found: Explanation) -> bool:
     """Whether a set shows a vehicle as they are built, and its heave is damped as theirs is."""
-    fit = found.fit
-    point = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
-    return is_real(found.names) and has_usual_heave(point)
+    return is_real(found.names) and has_usual_heave(found.fit.end)
 
 
 def _with_a_form(search: "Search", whole: Explanation) -> Explanation:

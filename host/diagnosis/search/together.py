@@ -24,16 +24,13 @@ from host.diagnosis.recordings.spans import led_excerpt
 from host.diagnosis.search.continuation import continued
 from host.diagnosis.search.pruning import pruned
 from host.diagnosis.search.whole_vehicle import all_beside
-from host.likelihood.gauss_newton import Point
 from host.likelihood.valleys import look_alikes
 
 if TYPE_CHECKING:
     from host.diagnosis.search.search import Search
 
 MOST_BESIDE = 3  # effects beside those that every vehicle has
-FAR_TOO_MUCH = (
-    100.0  # times the noise floor, of an excerpt: over all no end was seen nearer than a fifth of that
-)
+FAR_TOO_MUCH = 100.0  # times the noise floor, of an excerpt: over all no end was nearer than a fifth of it
 HARDLY_LESS = 0.95  # of what is left over the noise floor: another effect beside so many leads nowhere
 
 
@@ -156,9 +153,8 @@ def _among_look_alikes(search: "Search", best: Explanation) -> Explanation:
     A lag that joins a leading effect which had its work to do may leave the hull the lag's pole and take one
     of the hull's, from where no fit comes back.
     """
-    fit, rival = best.fit, best.lean()
-    here = Point(fit.structure, fit.parameters, fit.initial, fit.noise)
-    tasks: list[Task] = [(Fitter.entered, (start, rival)) for start in look_alikes(here)]
+    rival = best.lean()
+    tasks: list[Task] = [(Fitter.entered, (start, rival)) for start in look_alikes(best.fit.end)]
     found = min(search.workers.results(tasks), key=lambda e: e.bic, default=best)
     return search.remember(found) if found.bic < best.bic - margin(best) else best
 

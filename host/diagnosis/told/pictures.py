@@ -22,6 +22,7 @@ from host.identification.uncertainty import covariance
 from host.recordings.recording import Array, Recording
 
 BASE_COLOUR, SIMULATION_COLOUR, BAND, JUDGING = "#dd8452", "#7b5ea7", "#e3edf4", "#f3f0e6"
+DOUBT = "#f3d5cf"  # two deviations
 BINS = 14
 
 
@@ -159,7 +160,7 @@ def force_picture(found: Diagnosis) -> str:
     for (along, *over), values, std, (label, keys) in zip(
         axes, found.force.values, found.force.std, rows, strict=True
     ):
-        along.fill_between(recording.time, values - 2 * std, values + 2 * std, color="#f3d5cf", linewidth=0)
+        along.fill_between(recording.time, values - 2 * std, values + 2 * std, color=DOUBT, linewidth=0)
         along.plot(recording.time, values, color=MODEL, linewidth=0.9)
         along.axhline(0.0, color="#444444", linewidth=0.6)
         along.set_ylabel(f"missing {label}")
@@ -192,7 +193,7 @@ def layers_picture(found: Diagnosis) -> str:
         depths, terms = terms_over_depth(form.name, values)
         own = [fit.structure.names.index(share.name) for share in form.parameters[: terms.shape[1]]]
         sizes, std = terms @ fit.parameters[own], np.sqrt(np.sum(terms @ spread[np.ix_(own, own)] * terms, 1))
-        axis.fill_betweenx(depths, sizes - 2 * std, sizes + 2 * std, color="#f3d5cf", linewidth=0)
+        axis.fill_betweenx(depths, sizes - 2 * std, sizes + 2 * std, color=DOUBT, linewidth=0)
         axis.plot(sizes, depths, color=MODEL, linewidth=1.2)
         reach = max(np.ptp(sizes), 1e-9)
         axis.set_xlim(sizes.min() - 0.4 * reach, sizes.max() + 0.4 * reach)
