@@ -104,10 +104,14 @@ class Fit:
 
 
 def run_away(point: Point, inputs: list[Inputs], free: Mask) -> Fit:
-    """What a start ends as from which the model leaves the numbers: of no likelihood, chosen by nobody."""
+    """What a start ends as from which the model leaves the numbers: of no likelihood, chosen by nobody.
+
+    Forces are random in it if they were: what goes on from there is of the same kind.
+    """
     rows = [one.drive.shape[1] for one in inputs]
     nothing = [(np.zeros((2, count)), np.zeros((2, free.size + NX0, count))) for count in rows]
-    return finished(point.with_noise(np.ones(4)), nothing, inputs, free, -np.inf, 0, False)
+    noise = np.append(np.ones(2), point.noise[2:4] > 0.0)
+    return finished(point.with_noise(noise), nothing, inputs, free, -np.inf, 0, False)
 
 
 def finished(

@@ -66,3 +66,4 @@ def test_a_set_that_runs_away_is_the_worst_of_all(fitted: tuple[Fitter, Explanat
     start = Point(both.fit.structure, both.fit.parameters, both.fit.initial, both.fit.noise)
     lost = run_away(start, fitter.inputs(both.names), both.fit.free)
     assert fitter.bic(lost, both.names) == np.inf
+    assert not lost.has_process_noise  # or what goes on from there would be under random forces
