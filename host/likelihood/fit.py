@@ -110,7 +110,7 @@ def run_away(point: Point, inputs: list[Inputs], free: Mask) -> Fit:
     """
     rows = [one.drive.shape[1] for one in inputs]
     nothing = [(np.zeros((2, count)), np.zeros((2, free.size + NX0, count))) for count in rows]
-    noise = np.append(np.ones(2), point.noise[2:4] > 0.0)
+    noise = np.concatenate([np.ones(2), np.sign(point.noise[2:4])])
     return finished(point.with_noise(noise), nothing, inputs, free, -np.inf, 0, False)
 
 
