@@ -13,7 +13,8 @@ from host.catalogue.switching import after
 from host.dynamics.equations import Chain, Effect, Parameter, Slot, Term
 
 Action = Callable[[Chain, ca.SX], None]
-SETTLING = "speed_settling"
+SPEED_CHANGES = ("speed_change", "second_speed_change")
+"""A mission flown at several speeds has as many; the second is asked for beside the first."""
 SHORTEST = 0.05  # s, in which any speed changes: a vehicle has mass
 
 
@@ -22,6 +23,7 @@ class Change:
     """One quantity of the chain that takes another value at one moment.
 
     details  what else the change has, and `likely` start values of these
+    changes  entries without which it means nothing
     force, plane, sense  as of an Effect, with the change that has come so far
     """
 
@@ -32,6 +34,7 @@ class Change:
     equation: str
     details: tuple[Parameter, ...] = ()
     likely: tuple[tuple[float, ...], ...] = ((),)
+    changes: tuple[str, ...] = ()
     force: Action | None = None
     plane: Action | None = None
     sense: Action | None = None
@@ -58,6 +61,7 @@ class Change:
             manoeuvre="the same manoeuvre before and after",
             probes=tuple((0.0, 0.5, *values) for values in self.likely),
             scales=("", "duration", *("" for _ in self.details)),
+            changes=self.changes,
             force=with_size(self.force, come),
             plane=with_size(self.plane, come),
             sense=with_size(self.sense, come),
@@ -69,15 +73,30 @@ def with_size(action: Action | None, size: Callable[[Chain], ca.SX]) -> Term | N
     return None if action is None else lambda c: action(c, size(c))
 
 
-def _speed(c: Chain, size: ca.SX) -> None:
-    unmeasured = size * (1 - c.is_speed_known)
-    if SETTLING in c.p:  # else it is asked when it happened
-        lag = c.p[SETTLING] + SHORTEST
-        missing = ca.exp(-ca.fmax(c.time - c.p["speed_change_time"], 0) / lag)
-        c.surge = c.surge + c.p["u0"] * unmeasured * missing / lag
-        unmeasured = unmeasured * (1 - missing)
-    c.speed = c.speed + c.p["u0"] * unmeasured
-    c.speed_ratio = c.speed_ratio + unmeasured
+def _speed_change(name: str, size: str, sentence: str, changes: tuple[str, ...] = ()) -> Change:
+    settling, moment = f"{size.removesuffix('_step')}_settling", f"{name}_time"
+
+    def force(c: Chain, come: ca.SX) -> None:
+        unmeasured = come * (1 - c.is_speed_known)
+        if settling in c.p:  # else it is asked when it happened
+            lag = c.p[settling] + SHORTEST
+            missing = ca.exp(-ca.fmax(c.time - c.p[moment], 0) / lag)
+            c.surge = c.surge + c.p["u0"] * unmeasured * missing / lag
+            unmeasured = unmeasured * (1 - missing)
+        c.speed = c.speed + c.p["u0"] * unmeasured
+        c.speed_ratio = c.speed_ratio + unmeasured
+
+    return Change(
+        name=name,
+        slot="surge",
+        force=force,
+        size=Parameter(name=size, unit="1", lower=-0.9, upper=5, meaning="share lost or gained"),
+        sentence=sentence,
+        equation=f"u0 -> u0 (1 + {size} (1 - exp(-(t - {moment}) / {settling})))",
+        details=(Parameter(name=settling, unit="s", lower=0, upper=300, meaning="how slowly it changes"),),
+        likely=((0.0,), (2.0,)),
+        changes=changes,
+    )
 
 
 def _trim(c: Chain, size: ca.SX) -> None:
@@ -98,15 +117,16 @@ def _current(c: Chain, size: ca.SX) -> None:
 
 
 KINDS = (
-    Change(
-        name="speed_change",
-        slot="surge",
-        force=_speed,
-        size=Parameter(name="speed_step", unit="1", lower=-0.9, upper=5, meaning="share lost or gained"),
-        sentence="The forward speed changed at one moment: thrust was lost, or something drags.",
-        equation="u0 -> u0 (1 + speed_step (1 - exp(-(t - speed_change_time) / speed_settling)))",
-        details=(Parameter(name=SETTLING, unit="s", lower=0, upper=300, meaning="how slowly it changes"),),
-        likely=((0.0,), (2.0,)),
+    _speed_change(
+        "speed_change",
+        "speed_step",
+        "The forward speed changed at one moment: thrust was lost, or something drags.",
+    ),
+    _speed_change(
+        "second_speed_change",
+        "second_speed_step",
+        "The forward speed changed once more: thrust is set anew under way.",
+        changes=("speed_change",),
     ),
     Change(
         name="trim_moment_change",

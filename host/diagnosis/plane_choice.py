@@ -90,7 +90,7 @@ def likelier_first(
         return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
     if may_leave_out and whole is not None and leading.fitter.excess(whole.fit) > MUCH:
         on_progress("stretches of other physics")
-        short = short_runs(leading.recordings)
+        short = short_runs(leading.recordings, whole)
         apart, instead = NOTHING if short is None else stretches_apart(short, jobs)
         if apart:
             rest = likelier_first(ways(without(leading.recordings, apart, APART)), on_progress, jobs)

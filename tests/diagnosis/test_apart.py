@@ -96,7 +96,9 @@ def test_of_a_long_recording_some_pieces_teach_and_all_are_judged(monkeypatch: p
     monkeypatch.setattr(pieces, "MOST_ROWS", dive.time.size - 1)
     monkeypatch.setattr(pieces, "SPREAD", dive.time.size // 2)
     monkeypatch.setattr(
-        pieces, "best_of_all", lambda fitter: taught.append(len(fitter.recordings)) or fitted(fitter)
+        pieces,
+        "best_of_all",
+        lambda fitter, like=None: taught.append(len(fitter.recordings)) or fitted(fitter, like),
     )
     ((start, end),) = spans_of([dive])
     assert taught[0] == 10
@@ -148,7 +150,7 @@ def test_what_is_apart_is_left_out_and_told(monkeypatch: pytest.MonkeyPatch) -> 
         return [Way(recordings, fitter)]
 
     monkeypatch.setattr(plane_choice, "ways", begun)
-    monkeypatch.setattr(plane_choice, "short_runs", lambda _: rest)
+    monkeypatch.setattr(plane_choice, "short_runs", lambda *_: rest)
     monkeypatch.setattr(plane_choice, "stretches_apart", lambda *_: apart.Apart([(BEGINS, ENDS)]))
     monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: None if rest else whole)
     monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from host.catalogue import CATALOGUE, CHANGES, NEAR_THE_SURFACE, named, structure_of
+from host.catalogue.changes import SPEED_CHANGES
 from host.catalogue.moments import FIRST, LAST
 from host.catalogue.nuisance import FREE_TRIM, PLANE_BEFORE, SPEED_CORRECTION, has_memory
 from host.catalogue.unknown import DEEPEST, FORMS, IN_LAYERS, SHALLOWEST, SPANS
@@ -65,7 +66,8 @@ class Setting:
         if recordings[0].has_speed:
             self.held["u0"] = mean_speed(recordings)
             # Where the speed is measured its change is data, and there is nothing in it to estimate.
-            self.held |= {"speed_step": 0.0, "speed_change_time": 0.0, "speed_settling": 0.0}
+            own = (parameter.name for name in SPEED_CHANGES for parameter in named(name).parameters)
+            self.held |= dict.fromkeys(own, 0.0)
         else:
             self.held["ground_share"] = 0.0
         self.held |= dict.fromkeys(SPANS.values(), max(float(r.time[-1]) for r in recordings))

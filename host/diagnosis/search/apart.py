@@ -100,7 +100,7 @@ def _without_the_worst(fitter: Fitter, whole: Explanation) -> _Taught | None:
         if len(kept) < (1.0 - MOST) * len(pieces):
             return None
         fitter = Fitter(kept)
-        whole = best_of_all(fitter)
+        whole = best_of_all(fitter, whole)
     return None
 
 
@@ -116,7 +116,7 @@ def _followed(pieces: list[Recording], taught: _Taught) -> list[Recording]:
         few = np.linspace(0, len(doubted) - 1, min(len(doubted), len(taught.pieces)))
         more = {piece.time[0]: piece for piece in [*taught.pieces, *(doubted[round(k)] for k in few)]}
         fitter = Fitter([more[time] for time in sorted(more)])
-        again = _without_the_worst(fitter, best_of_all(fitter))
+        again = _without_the_worst(fitter, best_of_all(fitter, taught.whole))
         if again is None:
             return []
         left = _left_by(pieces, again.whole)

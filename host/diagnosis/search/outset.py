@@ -30,6 +30,7 @@ from host.diagnosis.fits.workers import Workers
 from host.diagnosis.recordings.spans import led_excerpt
 from host.diagnosis.search.lone_form import likely_forms
 from host.diagnosis.search.pruning import pruned
+from host.diagnosis.search.several_speeds import at_several_speeds
 from host.diagnosis.search.together import with_more
 from host.diagnosis.search.whole_vehicle import all_beside, ended, is_real
 from host.likelihood.fit import Fit
@@ -53,7 +54,10 @@ IN_TIME = ("surface_waves", "internal_wave", "unknown_swinging_moment", *sorted(
 
 
 def at_the_outset(fitter: Fitter) -> Explanation | None:
-    """The root with all that every vehicle has, where the root leaves much; None where it does not."""
+    """The root with all that every vehicle has, where the root leaves much; None where it does not.
+
+    And at several speeds, where that leaves far less.
+    """
     if fitter.excess(fitter.root.fit) < MUCH:
         return None
     best, names = fitter.root, names_of_all(fitter)
@@ -64,7 +68,7 @@ def at_the_outset(fitter: Fitter) -> Explanation | None:
         best = min(best, found, key=lambda e: e.bic)
         if fitter.excess(best.fit) > LOST:
             break
-    return best
+    return at_several_speeds(fitter, best) if fitter.excess(best.fit) > LOST else best
 
 
 def beside_what_leads(fitter: Fitter, best: Explanation, jobs: int = 1) -> Explanation:
