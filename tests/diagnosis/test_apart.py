@@ -35,6 +35,13 @@ def everywhere(time: float, x: Array, plane: float) -> tuple[float, float, float
     return 0.0, 1.5 * np.sin(time), 0.0
 
 
+def turning_often(time: float, x: Array, plane: float) -> tuple[float, float, float]:
+    """Every 100 s; and always something slight that nothing explains."""
+    is_turning = 85.0 < time % 100.0 < 97.0
+    moment = (0.8 + 3.0 * x[0]) * is_turning + 0.01 * np.sin(1.3 * time)
+    return 0.3 * is_turning * (1.0 + 5.0 * plane), moment, 0.0
+
+
 def spans_of(recordings: list[Recording]) -> list[Span]:
     short = short_runs(recordings)
     return [] if short is None else stretches_apart(short).spans
@@ -79,6 +86,28 @@ def test_what_an_effect_would_explain_is_not_apart(monkeypatch: pytest.MonkeyPat
     assert stretches_apart(short) == ([], short.whole)
     monkeypatch.setattr(apart, "_with_an_effect", lambda *_: None)
     assert stretches_apart(short) == ([], None)
+
+
+@pytest.mark.long
+def test_what_most_pieces_tell_is_found_though_the_others_bend_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(apart, "_without_the_worst", lambda *_: None)
+    short = short_runs([hidden_dive(turning_often, duration=306.0)])
+    assert short is not None
+    taught = apart._as_most_tell(short.fitter, short.whole)
+    assert taught is not None
+    left_out = {round(p.time[0]) for p in short.pieces} - {round(p.time[0]) for p in taught.pieces}
+    assert left_out == {77, 179, 281}
+
+
+def test_little_that_is_left_is_no_turn_and_what_runs_away_explains_no_piece() -> None:
+    short = short_runs([hidden_dive(duration=250.0)])
+    assert short is not None
+    assert apart._as_most_tell(short.fitter, short.whole) is None
+    whole = short.whole
+    moved = whole.fit.parameters.copy()
+    moved[whole.fit.structure.names.index("a2")] = 30.0  # a hull that drives its own pitch
+    away = replace(whole, fit=replace(whole.fit, parameters=moved))
+    assert np.isinf(apart._left_by(short.pieces, away)).all()
 
 
 def test_short_recordings_several_and_alarms_are_taken_whole() -> None:

@@ -7,6 +7,7 @@ left out until it does (least trimmed squares: Rousseeuw, J. Am. Stat. Assoc. 79
 """
 
 from dataclasses import replace
+from math import ceil, inf
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LITTLE
 from host.diagnosis.fits.prospects import form_gains
 from host.diagnosis.fits.workers import Workers
-from host.diagnosis.search.outset import IN_TIME, says_all
+from host.diagnosis.search.outset import FAR_LESS, IN_TIME, says_all
 from host.diagnosis.search.short_runs import ShortRuns, best_of_all
 from host.likelihood.output_error import output_error
 from host.recordings.left_out import Span
@@ -30,16 +31,22 @@ WORSE = 1.35  # times what the median piece leaves, and the noise floor: four de
 NOT_TAUGHT = 1.7  # the same of pieces that did not teach: turns leave tens
 AT_ONCE = 0.4  # of what the worst leaves: what is less bad may only be bent by that
 MOST_ROUNDS = 6
+DRAWS, DRAWN, LEAST_DRAWN = 8, 0.35, 6  # of pieces at random, the share of all in each, and the least of them
+FAR_WORSE = 5.0  # times the median, where something is left of all pieces
 BENT = 10.0  # times the noise floor: more is no small error of the coefficients
 MOST_STEPS = 10  # to the state with which a piece begins, all else held
 SHARE = 0.5  # of what leaving out does, that no effect does
 
 
 class _Taught(NamedTuple):
-    """Pieces without the worst, and all that every vehicle has, fitted to them."""
+    """Pieces without the worst, and all that every vehicle has, fitted to them.
+
+    is_all  whether nothing is left of them
+    """
 
     pieces: list[Recording]
     whole: Explanation
+    is_all: bool = True
 
 
 class Apart(NamedTuple):
@@ -63,7 +70,8 @@ def stretches_apart(short: ShortRuns, jobs: int = 1) -> Apart:
     teach what every vehicle has, and the others are held against that.
     """
     pieces = short.pieces
-    if (taught := _without_the_worst(short.fitter, short.whole)) is None:
+    taught = _without_the_worst(short.fitter, short.whole) or _as_most_tell(short.fitter, short.whole)
+    if taught is None:
         return NOTHING
     kept = taught.pieces if short.are_all_fitted else _followed(pieces, taught)
     starts = {piece.time[0] for piece in kept}
@@ -104,12 +112,57 @@ def _without_the_worst(fitter: Fitter, whole: Explanation) -> _Taught | None:
     return None
 
 
+def _as_most_tell(fitter: Fitter, whole: Explanation) -> _Taught | None:
+    """The pieces that most of them explain together, where these leave far less than all; else None.
+
+    Something may be left of them, that acts on all.
+    """
+    pieces, left = fitter.recordings, fitter.excess(whole.fit)
+    if left < BENT:
+        return None
+    rng, count = np.random.default_rng(0), max(LEAST_DRAWN, ceil(DRAWN * len(pieces)))
+    most = ceil((1.0 - MOST) * len(pieces))
+    best, by_best = whole, _left(fitter, whole)
+    for _ in range(DRAWS):
+        drawn = np.sort(rng.choice(len(pieces), count, replace=False))
+        one = best_of_all(Fitter([pieces[k] for k in drawn]), whole)
+        each = _left_by(pieces, one)
+        if np.sort(each)[:most].mean() < np.sort(by_best)[:most].mean():
+            best, by_best = one, each
+    kept: list[int] = []
+    for _ in range(MOST_ROUNDS):
+        before, kept = kept, np.sort(np.argsort(by_best)[:most]).tolist()
+        if kept == before:
+            break
+        best = _taught_by([pieces[k] for k in kept], best)
+        by_best = _left_by(pieces, best)
+    limit = FAR_WORSE * max(float(np.median(by_best[kept])), 1.0)
+    followed = [piece for piece, each in zip(pieces, by_best, strict=True) if each < limit]
+    if len(followed) < most:
+        return None
+    best = _taught_by(followed, best)
+    is_less = Fitter(followed).excess(best.fit) < FAR_LESS * left
+    return _Taught(followed, best, is_all=False) if is_less else None
+
+
+def _taught_by(pieces: list[Recording], known: Explanation) -> Explanation:
+    """All that every vehicle has, as these pieces tell it, from where others do and anew."""
+    fitter = Fitter(pieces)
+    begun = fitter.polished(fitter.refitted(known))
+    if says_all(fitter, begun):
+        return begun
+    return min(begun, best_of_all(fitter, known), key=lambda e: e.bic)
+
+
 def _followed(pieces: list[Recording], taught: _Taught) -> list[Recording]:
     """The pieces that others explain as well as themselves; none where what is doubted would not be taught.
 
     A few may not have shown all that the hull does, so what they leave a little of teaches as well.
     """
     left = _left_by(pieces, taught.whole)
+    if not taught.is_all:
+        limit = FAR_WORSE * max(float(np.median(left)), 1.0)
+        return [piece for piece, each in zip(pieces, left, strict=True) if each < limit]
     is_doubted = (left > _most(left)) & (left < BENT)
     doubted = [piece for piece, doubt in zip(pieces, is_doubted, strict=True) if doubt]
     if doubted:
@@ -131,6 +184,8 @@ def _left_by(pieces: list[Recording], whole: Explanation) -> Array:
     start = replace(fitter.carried_over(whole), parameters=whole.fit.parameters)
     held = np.zeros(start.parameters.size, dtype=bool)
     fit = output_error(start, fitter.inputs(whole.names), held, MOST_STEPS)
+    if not np.isfinite(fit.log_likelihood):  # it runs away from one of them at least
+        return np.full(len(pieces), inf)
     return _left(fitter, fitter.explained(whole.names, fit))
 
 
