@@ -13,7 +13,7 @@ from host.diagnosis.fits.margins import LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN
 from host.diagnosis.fits.sea_fits import as_filtered, with_waves
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.recordings.spans import divide, excerpt
-from host.diagnosis.search.apart import NOTHING, stretches_apart
+from host.diagnosis.search.apart import BENT, stretches_apart
 from host.diagnosis.search.led_by_filter import led_by_a_filter
 from host.diagnosis.search.outset import (
     at_the_outset,
@@ -89,25 +89,19 @@ def likelier_first(
     if whole is not None and says_all(leading.fitter, whole):
         return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
     if may_leave_out and whole is not None and leading.fitter.excess(whole.fit) > MUCH:
-        on_progress("stretches of other physics")
-        short = short_runs(leading.recordings, whole)
-        apart, instead = NOTHING if short is None else stretches_apart(short, jobs)
-        if apart:
-            rest = likelier_first(ways(without(leading.recordings, apart, APART)), on_progress, jobs)
-            return [way._replace(apart=tuple(apart)) for way in rest]
-        if instead is not None:
-            whole = min(whole, leading.fitter.refitted(instead), key=lambda e: e.bic)
-            if says_all(leading.fitter, whole):
-                return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
-        if short is not None:
-            taught = partial(followed_shortly, whole=whole, short=short)
-            if led := _led([leading, *others], whole, taught, on_progress, jobs):
-                return led
+        told, whole = _in_short_runs([leading, *others], whole, on_progress, jobs)
+        if told:
+            return told
     if whole is not None:
         whole = beside_what_leads(leading.fitter, whole, jobs)
     if seen := _among_waves(found):
         on_progress("what every vehicle has, in the waves")
         return _in_a_swell(seen, whole)
+    if may_leave_out and whole is not None and leading.fitter.excess(whole.fit) > BENT:
+        on_progress("stretches of other physics, as most tell")
+        short = short_runs(leading.recordings, whole)
+        if short is not None and (apart := stretches_apart(short, jobs, as_most_tell=True).spans):
+            return _without(leading, apart, on_progress, jobs)
     if whole is not None:
         filtered = partial(led_by_a_filter, whole=whole)
         if led := _led([leading, *others], whole, filtered, on_progress, jobs):
@@ -119,6 +113,34 @@ def likelier_first(
         whole = begun[0].outset
     pushed = [] if whole is None else _pushed_about(begun, whole, on_progress, jobs)
     return pushed or (begun if leads else by_single_effects(found, on_progress, jobs))
+
+
+def _in_short_runs(
+    found: list[Way], whole: Explanation, on_progress: Callable[[str], None], jobs: int
+) -> tuple[list[Way], Explanation]:
+    """The ways as short runs tell them, none where these tell nothing; and the whole with what they add.
+
+    Without stretches that are apart, with what explains these, or led by what short runs teach.
+    """
+    leading = found[0]
+    on_progress("stretches of other physics")
+    if (short := short_runs(leading.recordings, whole)) is None:
+        return [], whole
+    apart, instead = stretches_apart(short, jobs)
+    if apart:
+        return _without(leading, apart, on_progress, jobs), whole
+    if instead is not None:
+        whole = min(whole, leading.fitter.refitted(instead), key=lambda e: e.bic)
+        if says_all(leading.fitter, whole):
+            return [way._replace(outset=own) for way, own in _as_seen_by(found, whole)], whole
+    taught = partial(followed_shortly, whole=whole, short=short)
+    return _led(found, whole, taught, on_progress, jobs), whole
+
+
+def _without(leading: Way, apart: list[Span], on_progress: Callable[[str], None], jobs: int) -> list[Way]:
+    """The ways without these stretches, the likelier first."""
+    rest = likelier_first(ways(without(leading.recordings, apart, APART)), on_progress, jobs)
+    return [way._replace(apart=tuple(apart)) for way in rest]
 
 
 def _as_seen_by(found: list[Way], one: Explanation) -> list[tuple[Way, Explanation]]:

@@ -62,15 +62,18 @@ class Apart(NamedTuple):
 NOTHING = Apart([])
 
 
-def stretches_apart(short: ShortRuns, jobs: int = 1) -> Apart:
+def stretches_apart(short: ShortRuns, jobs: int = 1, as_most_tell: bool = False) -> Apart:
     """The stretches of one recording without which all that every vehicle has leaves white noise.
+
+    as_most_tell  or without which it leaves far less, as most stretches together tell: that takes longer
 
     None where they are many. What lasts until the end, or from the start, is one of them if something else
     lasted as long: what changed and never comes back is in the catalogue. Of a long recording some pieces
     teach what every vehicle has, and the others are held against that.
     """
     pieces = short.pieces
-    taught = _without_the_worst(short.fitter, short.whole) or _as_most_tell(short.fitter, short.whole)
+    told = _as_most_tell if as_most_tell else _without_the_worst
+    taught = told(short.fitter, short.whole)
     if taught is None:
         return NOTHING
     kept = taught.pieces if short.are_all_fitted else _followed(pieces, taught)

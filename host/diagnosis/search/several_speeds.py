@@ -24,8 +24,3 @@ def at_several_speeds(fitter: Fitter, whole: Explanation) -> Explanation:
         if fitter.excess(joined.fit) < most:
             found = joined
     return found
-
-
-def is_at_several_speeds(found: Explanation) -> bool:
-    """Whether a change of the speed is in a set."""
-    return not found.names.isdisjoint(SPEED_CHANGES)

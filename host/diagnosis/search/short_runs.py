@@ -13,7 +13,6 @@ from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LITTLE, MUCH, margin
 from host.diagnosis.recordings.spans import is_measured, pieces_of
 from host.diagnosis.search.outset import ends_of, is_enough_beside, names_of_all, says_all
-from host.diagnosis.search.several_speeds import is_at_several_speeds
 from host.recordings.recording import Recording
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ class ShortRuns(NamedTuple):
 def short_runs(recordings: list[Recording], like: Explanation | None = None) -> ShortRuns | None:
     """The pieces of one recording; None where they are few, of several recordings, or of one with alarms.
 
-    like  all that every vehicle has, fitted to long runs: at several speeds it says more than short ones can
+    like  all that every vehicle has, fitted to long runs, maybe beside what leads
     """
     cut = [piece for one in recordings for piece in pieces_of(one, max(LEAST_ROWS, round(PIECE / one.step)))]
     pieces = [piece for piece in cut if is_measured(piece)]
@@ -65,10 +64,10 @@ def _spread(pieces: list[Recording]) -> list[Recording]:
 def best_of_all(fitter: Fitter, like: Explanation | None = None) -> Explanation:
     """The root with all that every vehicle has, from the first start that leaves nothing, or the best.
 
-    like  the same of other stretches; at several speeds it is a start
+    like  the same of other stretches: a start, if anything leads there
     """
     best = fitter.root
-    if like is not None and is_at_several_speeds(like):
+    if like is not None and not like.names <= names_of_all(fitter):
         best = fitter.polished(fitter.refitted(like))
     for found in ends_of(fitter, names_of_all(fitter)):
         best = min(best, found, key=lambda e: e.bic)
