@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 MOST_BESIDE = 3  # effects beside those that every vehicle has
 FAR_TOO_MUCH = 100.0  # times the noise floor, of an excerpt: over all no end was nearer than a fifth of it
 HARDLY_LESS = 0.95  # of what is left over the noise floor: another effect beside so many leads nowhere
+FAR, LESS = 10.0, 0.7  # times the floor, and the same there: of three that lack, the largest leaves two thirds
 
 
 def at_once(search: "Search", leading: list[Explanation]) -> Explanation:
@@ -107,7 +108,7 @@ def with_more(search: "Search", best: Explanation, least: float = LITTLE) -> Exp
         best = better
         search.joint.add(best.names)
         before, left = left, search.fitter.excess(best.fit)
-        if left > MUCH and left > HARDLY_LESS * before:
+        if left > MUCH and left > (LESS if left > FAR else HARDLY_LESS) * before:
             break
     return best
 
