@@ -57,7 +57,7 @@ class Rounds:
 
     def on_progress(self, _: str) -> None: ...
 
-    def _continued(self) -> Any:
+    def _continued(self, _: float) -> Any:
         self.continued += 1
         return self.sets[0]
 
@@ -138,7 +138,7 @@ def test_where_more_that_joins_does_not_help_a_continuation_begins_anew(
 ) -> None:
     search = Rounds([1.6], True, monkeypatch)
     end = SimpleNamespace(names=frozenset({9}), fit=1.02, bic=-9000.0)
-    monkeypatch.setattr(module, "_by_continuation", lambda _: end)
+    monkeypatch.setattr(module, "_by_continuation", lambda *_: end)
     assert found(search) is end
 
 
@@ -211,7 +211,7 @@ def test_what_drifts_gives_way_to_a_hull_that_a_continuation_finds(
     search.asks_drift = True
     hull = SimpleNamespace(names=frozenset({9}), fit=end, bic=-9000.0)
     monkeypatch.setattr(module, "plain_drift", lambda *_: beside)
-    monkeypatch.setattr(module, "_by_continuation", lambda _: hull)
+    monkeypatch.setattr(module, "_by_continuation", lambda *_: hull)
     assert found(search) is (None if is_adrift else hull)
     assert (search.adrift is beside) is is_adrift
 
@@ -242,10 +242,12 @@ def test_a_continuation_goes_through_an_excerpt_of_which_it_leaves_little(
     monkeypatch.setattr(module, "Fitter", Part)
     monkeypatch.setattr(module, "led_excerpt", lambda _: ["piece"])
     monkeypatch.setattr(module, "continued", lambda runs, *_: found if runs == ["piece"] else "over all")
-    end: Any = module._led_by_the_measurements(search, frozenset(), {})
+    end: Any = module._led_by_the_measurements(search, frozenset(), {}, np.inf)
     assert end == ("from the excerpt" if left < MUCH else "over all" if left < 100.0 else None)
+    end = module._led_by_the_measurements(search, frozenset(), {}, left - 0.01)
+    assert end == ("from the excerpt" if left < MUCH else None)  # another set leaves less of all
     monkeypatch.setattr(module, "led_excerpt", lambda runs: runs)
-    assert module._led_by_the_measurements(search, frozenset(), {}) == "over all"
+    assert module._led_by_the_measurements(search, frozenset(), {}, 0.0) == "over all"
 
 
 def test_a_continuation_holds_what_keeps_the_plane_back_from_the_start(
@@ -261,11 +263,12 @@ def test_a_continuation_holds_what_keeps_the_plane_back_from_the_start(
         fitter=SimpleNamespace(tools_beside=lambda _: ()),
         fault_of_the_drive=SimpleNamespace(names=frozenset(structure.effect_names), fit=fit),
     )
-    assert module._by_continuation(search) is None
-    ((names, known),) = asked
+    assert module._by_continuation(search, 5.0) is None
+    ((names, known, most),) = asked
+    assert most == 5.0
     assert names == {*ORDINARY, "free_trim", "actuator_rate_limit"}
     assert known == {"plane_rate": values[structure.names.index("plane_rate")]}
     asked.clear()
     search.fault_of_the_drive = None
-    assert module._by_continuation(search) is None
+    assert module._by_continuation(search, 5.0) is None
     assert asked[0][0] == {*ORDINARY, "free_trim"}

@@ -32,7 +32,10 @@ if TYPE_CHECKING:
 MOST_BESIDE = 3  # effects beside those that every vehicle has
 FAR_TOO_MUCH = 100.0  # times the noise floor, of an excerpt: over all no end was nearer than a fifth of it
 HARDLY_LESS = 0.95  # of what is left over the noise floor: another effect beside so many leads nowhere
-FAR, LESS = 10.0, 0.7  # times the floor, and the same there: of three that lack, the largest leaves two thirds
+FAR, LESS = (
+    10.0,
+    0.7,
+)  # times the floor, and the same there: of three that lack, the largest leaves two thirds
 
 
 def at_once(search: "Search", leading: list[Explanation]) -> Explanation:
@@ -73,8 +76,9 @@ def together(search: "Search", leading: Explanation, joint: Explanation) -> Expl
     if search.asks_drift and fitter.excess(best.fit) > LITTLE:
         search.on_progress("sensors that wander, gusts")
         search.adrift = plain_drift(fitter, best)
-    may_be_led = fitter.excess(best.fit) < MUCH or not search.is_second
-    if fitter.excess(best.fit) > LITTLE and may_be_led and (end := _by_continuation(search)) is not None:
+    left = fitter.excess(best.fit)
+    may_be_led = left < MUCH or not search.is_second
+    if left > LITTLE and may_be_led and (end := _by_continuation(search, left)) is not None:
         # What drifts can make up for a hull in another valley than the truth.
         if fitter.excess(end.fit) < LITTLE:
             search.adrift = None
@@ -160,8 +164,10 @@ def _among_look_alikes(search: "Search", best: Explanation) -> Explanation:
     return search.remember(found) if found.bic < best.bic - margin(best) else best
 
 
-def _by_continuation(search: "Search") -> Explanation | None:
+def _by_continuation(search: "Search", most: float) -> Explanation | None:
     """All that every vehicle has, with little beside it; None where the filter loses the recording.
+
+    Or where it leaves more than the most of an excerpt, which a set that is known leaves of all.
 
     With what keeps the plane back, where that leads: no force is to stand for that.
     """
@@ -169,7 +175,7 @@ def _by_continuation(search: "Search") -> Explanation | None:
     faults, known = _faults_of_the_drive(search)
     names = frozenset({*ORDINARY, FREE_TRIM.name, *faults})
     names |= {*search.fitter.tools_beside(names)}
-    found = _led_by_the_measurements(search, names, known)
+    found = _led_by_the_measurements(search, names, known, most)
     if found is None:
         return None
     end = search.remember(search.fitter.polished(found))
@@ -188,11 +194,12 @@ def _faults_of_the_drive(search: "Search") -> tuple[Names, dict[str, float]]:
 
 
 def _led_by_the_measurements(
-    search: "Search", names: Names, known: Mapping[str, float]
+    search: "Search", names: Names, known: Mapping[str, float], most: float
 ) -> Explanation | None:
-    """The set by continuation through an excerpt, and from there on all; over all where it leaves much of it.
+    """The set by continuation through an excerpt, and from there over all; over all if it leaves much of it.
 
-    Where it leaves far too much of short pieces, it leads nowhere over all, which takes longest.
+    Where it leaves far too much of short pieces, or more than `most`, it leads nowhere over all, which takes
+    longest.
     """
     pieces = led_excerpt(search.fitter.recordings)
     if pieces is not search.fitter.recordings and not search.fitter.wander.any():
@@ -202,7 +209,7 @@ def _led_by_the_measurements(
         left = inf if found is None else fitter.excess(found.fit)
         if found is not None and left < MUCH:
             return search.fitter.refitted(found)
-        if FAR_TOO_MUCH < left < inf:
+        if min(most, FAR_TOO_MUCH) < left < inf:
             return None
     return continued(search, names, MOST_BESIDE, known)
 
