@@ -89,11 +89,10 @@ def test_what_an_effect_would_explain_is_not_apart(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.long
-def test_what_most_pieces_tell_is_found_though_the_others_bend_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(apart, "_without_the_worst", lambda *_: None)
+def test_what_most_pieces_tell_is_found_though_the_others_bend_all() -> None:
     short = short_runs([hidden_dive(turning_often, duration=306.0)])
     assert short is not None
-    taught = apart._as_most_tell(short.fitter, short.whole)
+    taught = apart._as_most_tell(short.fitter, short.whole, 1)
     assert taught is not None
     left_out = {round(p.time[0]) for p in short.pieces} - {round(p.time[0]) for p in taught.pieces}
     assert left_out == {77, 179, 281}
@@ -102,7 +101,7 @@ def test_what_most_pieces_tell_is_found_though_the_others_bend_all(monkeypatch: 
 def test_little_that_is_left_is_no_turn_and_what_runs_away_explains_no_piece() -> None:
     short = short_runs([hidden_dive(duration=250.0)])
     assert short is not None
-    assert apart._as_most_tell(short.fitter, short.whole) is None
+    assert apart._as_most_tell(short.fitter, short.whole, 1) is None
     whole = short.whole
     moved = whole.fit.parameters.copy()
     moved[whole.fit.structure.names.index("a2")] = 30.0  # a hull that drives its own pitch

@@ -11,6 +11,7 @@ from math import ceil, inf
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from host.catalogue.kin import OFFSETS
 from host.catalogue.moments import SCANS
@@ -65,15 +66,15 @@ NOTHING = Apart([])
 def stretches_apart(short: ShortRuns, jobs: int = 1, as_most_tell: bool = False) -> Apart:
     """The stretches of one recording without which all that every vehicle has leaves white noise.
 
-    as_most_tell  or without which it leaves far less, as most stretches together tell: that takes longer
-
     None where they are many. What lasts until the end, or from the start, is one of them if something else
     lasted as long: what changed and never comes back is in the catalogue. Of a long recording some pieces
     teach what every vehicle has, and the others are held against that.
+
+    as_most_tell  or without which it leaves far less, as most stretches together tell; that takes longer
     """
     pieces = short.pieces
-    told = _as_most_tell if as_most_tell else _without_the_worst
-    taught = told(short.fitter, short.whole)
+    fitter, whole = short.fitter, short.whole
+    taught = _as_most_tell(fitter, whole, jobs) if as_most_tell else _without_the_worst(fitter, whole)
     if taught is None:
         return NOTHING
     kept = taught.pieces if short.are_all_fitted else _followed(pieces, taught)
@@ -115,7 +116,7 @@ def _without_the_worst(fitter: Fitter, whole: Explanation) -> _Taught | None:
     return None
 
 
-def _as_most_tell(fitter: Fitter, whole: Explanation) -> _Taught | None:
+def _as_most_tell(fitter: Fitter, whole: Explanation, jobs: int) -> _Taught | None:
     """The pieces that most of them explain together, where these leave far less than all; else None.
 
     Something may be left of them, that acts on all.
@@ -125,13 +126,10 @@ def _as_most_tell(fitter: Fitter, whole: Explanation) -> _Taught | None:
         return None
     rng, count = np.random.default_rng(0), max(LEAST_DRAWN, ceil(DRAWN * len(pieces)))
     most = ceil((1.0 - MOST) * len(pieces))
-    best, by_best = whole, _left(fitter, whole)
-    for _ in range(DRAWS):
-        drawn = np.sort(rng.choice(len(pieces), count, replace=False))
-        one = best_of_all(Fitter([pieces[k] for k in drawn]), whole)
-        each = _left_by(pieces, one)
-        if np.sort(each)[:most].mean() < np.sort(by_best)[:most].mean():
-            best, by_best = one, each
+    draws = [np.sort(rng.choice(len(pieces), count, replace=False)) for _ in range(DRAWS)]
+    with Workers(fitter, jobs) as workers:
+        found: list[tuple[Explanation, Array]] = workers.results([(_of_some, (d, whole)) for d in draws])
+    best, by_best = min(found, key=lambda each: float(np.sort(each[1])[:most].mean()))
     kept: list[int] = []
     for _ in range(MOST_ROUNDS):
         before, kept = kept, np.sort(np.argsort(by_best)[:most]).tolist()
@@ -139,13 +137,23 @@ def _as_most_tell(fitter: Fitter, whole: Explanation) -> _Taught | None:
             break
         best = _taught_by([pieces[k] for k in kept], best)
         by_best = _left_by(pieces, best)
-    limit = FAR_WORSE * max(float(np.median(by_best[kept])), 1.0)
-    followed = [piece for piece, each in zip(pieces, by_best, strict=True) if each < limit]
+    followed = _not_far_worse(pieces, by_best)
     if len(followed) < most:
         return None
     best = _taught_by(followed, best)
     is_less = Fitter(followed).excess(best.fit) < FAR_LESS * left
     return _Taught(followed, best, is_all=False) if is_less else None
+
+
+def _of_some(fitter: Fitter, drawn: NDArray[np.intp], whole: Explanation) -> tuple[Explanation, Array]:
+    """All that every vehicle has, as some of the pieces tell it, and what it leaves of each of all."""
+    one = best_of_all(Fitter([fitter.recordings[k] for k in drawn]), whole)
+    return one, _left_by(fitter.recordings, one)
+
+
+def _not_far_worse(pieces: list[Recording], left: Array) -> list[Recording]:
+    limit = FAR_WORSE * max(float(np.median(left)), 1.0)
+    return [piece for piece, each in zip(pieces, left, strict=True) if each < limit]
 
 
 def _taught_by(pieces: list[Recording], known: Explanation) -> Explanation:
@@ -164,8 +172,7 @@ def _followed(pieces: list[Recording], taught: _Taught) -> list[Recording]:
     """
     left = _left_by(pieces, taught.whole)
     if not taught.is_all:
-        limit = FAR_WORSE * max(float(np.median(left)), 1.0)
-        return [piece for piece, each in zip(pieces, left, strict=True) if each < limit]
+        return _not_far_worse(pieces, left)
     is_doubted = (left > _most(left)) & (left < BENT)
     doubted = [piece for piece, doubt in zip(pieces, is_doubted, strict=True) if doubt]
     if doubted:
