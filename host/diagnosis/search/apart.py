@@ -33,7 +33,7 @@ NOT_TAUGHT = 1.7  # the same of pieces that did not teach: turns leave tens
 AT_ONCE = 0.4  # of what the worst leaves: what is less bad may only be bent by that
 MOST_ROUNDS = 6
 DRAWS, DRAWN, LEAST_DRAWN = 8, 0.35, 6  # of pieces at random, the share of all in each, and the least of them
-FAR_WORSE = 5.0  # times the median, where something is left of all pieces
+FAR_WORSE = 3.5  # times the median, where something is left of all pieces: twice that is usual
 BENT = 10.0  # times the noise floor: more is no small error of the coefficients
 MOST_STEPS = 10  # to the state with which a piece begins, all else held
 SHARE = 0.5  # of what leaving out does, that no effect does
@@ -138,8 +138,6 @@ def _as_most_tell(fitter: Fitter, whole: Explanation, jobs: int) -> _Taught | No
         best = _taught_by([pieces[k] for k in kept], best)
         by_best = _left_by(pieces, best)
     followed = _not_far_worse(pieces, by_best)
-    if len(followed) < most:
-        return None
     best = _taught_by(followed, best)
     is_less = Fitter(followed).excess(best.fit) < FAR_LESS * left
     return _Taught(followed, best, is_all=False) if is_less else None
@@ -152,8 +150,10 @@ def _of_some(fitter: Fitter, drawn: NDArray[np.intp], whole: Explanation) -> tup
 
 
 def _not_far_worse(pieces: list[Recording], left: Array) -> list[Recording]:
-    limit = FAR_WORSE * max(float(np.median(left)), 1.0)
-    return [piece for piece, each in zip(pieces, left, strict=True) if each < limit]
+    """Those of which not far more is left than of most, and never fewer than most."""
+    best = float(np.sort(left)[ceil((1.0 - MOST) * len(pieces)) - 1])
+    limit = max(FAR_WORSE * max(float(np.median(left)), 1.0), best)
+    return [piece for piece, each in zip(pieces, left, strict=True) if each <= limit]
 
 
 def _taught_by(pieces: list[Recording], known: Explanation) -> Explanation:
