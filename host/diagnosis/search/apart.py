@@ -24,6 +24,7 @@ from host.diagnosis.fits.workers import Workers
 from host.diagnosis.search.outset import FAR_LESS, IN_TIME, says_all
 from host.diagnosis.search.short_runs import ShortRuns, best_of_all
 from host.likelihood.output_error import output_error
+from host.likelihood.valleys import has_usual_heave
 from host.recordings.left_out import Span
 from host.recordings.recording import Array, Recording
 
@@ -119,7 +120,8 @@ def _without_the_worst(fitter: Fitter, whole: Explanation) -> _Taught | None:
 def _as_most_tell(fitter: Fitter, whole: Explanation, jobs: int) -> _Taught | None:
     """The pieces that most of them explain together, where these leave far less than all; else None.
 
-    Something may be left of them, that acts on all.
+    Something may be left of them, that acts on all. Not by a hull that hardly heaves: where each piece begins at
+    a heave of its own, that does for whatever pushes it.
     """
     pieces, left = fitter.recordings, fitter.excess(whole.fit)
     if left < BENT:
@@ -139,14 +141,15 @@ def _as_most_tell(fitter: Fitter, whole: Explanation, jobs: int) -> _Taught | No
         by_best = _left_by(pieces, best)
     followed = _not_far_worse(pieces, by_best)
     best = _taught_by(followed, best)
-    is_less = Fitter(followed).excess(best.fit) < FAR_LESS * left
+    is_less = Fitter(followed).excess(best.fit) < FAR_LESS * left and has_usual_heave(best.fit.end)
     return _Taught(followed, best, is_all=False) if is_less else None
 
 
 def _of_some(fitter: Fitter, drawn: NDArray[np.intp], whole: Explanation) -> tuple[Explanation, Array]:
     """All that every vehicle has, as some of the pieces tell it, and what it leaves of each of all."""
     one = best_of_all(Fitter([fitter.recordings[k] for k in drawn]), whole)
-    return one, _left_by(fitter.recordings, one)
+    left = _left_by(fitter.recordings, one)
+    return one, left if has_usual_heave(one.fit.end) else np.full_like(left, inf)
 
 
 def _not_far_worse(pieces: list[Recording], left: Array) -> list[Recording]:
