@@ -120,8 +120,8 @@ def _without_the_worst(fitter: Fitter, whole: Explanation) -> _Taught | None:
 def _as_most_tell(fitter: Fitter, whole: Explanation, jobs: int) -> _Taught | None:
     """The pieces that most of them explain together, where these leave far less than all; else None.
 
-    Something may be left of them, that acts on all. Not by a hull that hardly heaves: where each piece begins at
-    a heave of its own, that does for whatever pushes it.
+    Something may be left of them, that acts on all. Not by a hull that hardly heaves: what each piece begins
+    with then does for whatever pushes it.
     """
     pieces, left = fitter.recordings, fitter.excess(whole.fit)
     if left < BENT:
