@@ -98,7 +98,9 @@ def test_what_most_pieces_tell_is_found_though_the_others_bend_all() -> None:
     assert left_out == {77, 179, 281}
 
 
-def test_little_that_is_left_is_no_turn_and_what_runs_away_explains_no_piece() -> None:
+def test_little_that_is_left_is_no_turn_and_what_runs_away_explains_no_piece(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     short = short_runs([hidden_dive(duration=250.0)])
     assert short is not None
     assert apart._as_most_tell(short.fitter, short.whole, 1) is None
@@ -107,6 +109,15 @@ def test_little_that_is_left_is_no_turn_and_what_runs_away_explains_no_piece() -
     moved[whole.fit.structure.names.index("a2")] = 30.0  # a hull that drives its own pitch
     away = replace(whole, fit=replace(whole.fit, parameters=moved))
     assert np.isinf(apart._left_by(short.pieces, away)).all()
+    # So does a hull that hardly heaves, as what each piece begins with does for whatever pushes it.
+    idle = whole.fit.parameters.copy()
+    idle[whole.fit.structure.names.index("a1")] = -0.001
+    still = replace(whole, fit=replace(whole.fit, parameters=idle))
+    monkeypatch.setattr(apart, "best_of_all", lambda *_: still)
+    monkeypatch.setattr(apart, "BENT", 0.0)
+    assert np.isinf(apart._of_some(short.fitter, np.arange(6), whole)[1]).all()
+    monkeypatch.setattr(apart, "_taught_by", lambda *_: pytest.fail("nothing is taught by such a hull"))
+    assert apart._as_most_tell(short.fitter, short.whole, 1) is None
 
 
 def test_short_recordings_several_and_alarms_are_taken_whole() -> None:

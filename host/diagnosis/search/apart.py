@@ -132,6 +132,8 @@ def _as_most_tell(fitter: Fitter, whole: Explanation, jobs: int) -> _Taught | No
     with Workers(fitter, jobs) as workers:
         found: list[tuple[Explanation, Array]] = workers.results([(_of_some, (d, whole)) for d in draws])
     best, by_best = min(found, key=lambda each: float(np.sort(each[1])[:most].mean()))
+    if not np.isfinite(by_best).any():
+        return None
     kept: list[int] = []
     for _ in range(MOST_ROUNDS):
         before, kept = kept, np.sort(np.argsort(by_best)[:most]).tolist()

@@ -65,7 +65,7 @@ def continued(
     names |= {*APPARENT}
     fitter, common = search.fitter, names | {ALONG_THE_HULL}
     followed = _with_what_is_large(search, names, known or {})
-    swapped = [at for one in followed for at in with_poles_swapped(_at(one))]
+    swapped = [at for one in followed for at in with_poles_swapped(one.fit.end)]
     most, most_lost = LITTLE, NAMING_MARGIN  # without another look at what is lacking
     least = inf  # BIC so far: the true physics gets likelier with every stage
     for share in STAGES[UNDECIDED:]:
@@ -91,7 +91,7 @@ def continued(
         if not _is_near(followed[0], likeliest):
             break
     best = min(followed, key=_charged)
-    return fitter.explained(best.names, fitter.fitted([_forced(fitter, _at(best), 0.0)]))
+    return fitter.explained(best.names, fitter.fitted([_forced(fitter, best.fit.end, 0.0)]))
 
 
 def _kept(search: "Search", followed: list[Explanation]) -> Explanation:
@@ -142,7 +142,7 @@ def _forced(fitter: "Fitter", point: Point, share: float) -> Point:
 def _under(
     search: "Search", followed: list[Explanation], share: float, steps: int = FEW_STEPS
 ) -> list[Explanation]:
-    return _steered(search, [_forced(search.fitter, _at(one), share) for one in followed], steps)
+    return _steered(search, [_forced(search.fitter, one.fit.end, share) for one in followed], steps)
 
 
 def _left(steered: Explanation) -> float:
@@ -200,10 +200,6 @@ def _moved(search: "Search", steered: list[Explanation]) -> list[Explanation]:
     if not steered or _left(steered[0]) <= SLIGHTLY:
         return steered
     return _distinct([*steered, *_steered(search, with_other_moments(search.fitter, steered[0]))])[:FOLLOWED]
-
-
-def _at(steered: Explanation) -> Point:
-    return steered.fit.end
 
 
 def _steered(search: "Search", points: list[Point], steps: int = FEW_STEPS) -> list[Explanation]:
