@@ -64,10 +64,14 @@ def explain(
         drift = in_drift(search, search.adrift)
         if drift is not None and drift.left.is_nothing:
             return drift
-        tried = search.tried.values()
-        search = Search(fitter, workers, on_progress, fitter.base, fitter.root, alone=search.alone_so_far())
-        search.is_second = is_second
-        best = search.run(again or _many_in(fitter, tried))
+        if search.is_pushed_about:
+            best = min(search.untrimmed, key=lambda e: e.bic)
+        else:
+            again = again or _many_in(fitter, search.tried.values())
+            alone = search.alone_so_far()
+            search = Search(fitter, workers, on_progress, fitter.base, fitter.root, alone=alone)
+            search.is_second = is_second
+            best = search.run(again)
     may_be_sea = part is None or part.best.fit.has_process_noise
     if may_be_sea and (led := _led_astray(search, best)) is not None:
         return led

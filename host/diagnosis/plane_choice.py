@@ -10,7 +10,7 @@ from host.diagnosis.disturbances.plain_waves import plain_waves, whole_in_waves
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN, margin
-from host.diagnosis.fits.sea_fits import as_filtered, with_waves
+from host.diagnosis.fits.sea_fits import as_filtered, with_sea, with_waves
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.recordings.spans import divide, excerpt
 from host.diagnosis.search.apart import BENT, stretches_apart
@@ -31,6 +31,7 @@ from host.recordings.plane_between_rows import ways_between
 from host.recordings.recording import Recording
 
 FAR_LIKELIER = 1.0  # of BIC a sample: what no search without waves makes up for
+FORCED = 0.5  # the same, of random forces: so much leads any free run away
 CONTENDERS = 10  # sets that are tried with the plane the other way
 MOST_WAYS = 2  # that are searched: the base equations tell a third from these
 APART = "other physics acts, and left out"
@@ -111,6 +112,9 @@ def likelier_first(
         seen_by_all = _as_seen_by(begun, leading.fitter.polished(whole))
         begun = [way._replace(outset=own) for way, own in seen_by_all]
         whole = begun[0].outset
+    if whole is not None and (forced := _as_seen_under_forces(begun, whole)):
+        begun, whole = [way for way, _ in forced], forced[0][1]
+        leads = True
     pushed = [] if whole is None else _pushed_about(begun, whole, on_progress, jobs)
     return pushed or (begun if leads else by_single_effects(found, on_progress, jobs))
 
@@ -197,6 +201,24 @@ def _led(
     if pushed is None:
         return []
     return [way._replace(pushed=own, calm=whole) for way, own in _as_seen_by(found, pushed)]
+
+
+def _as_seen_under_forces(found: list[Way], whole: Explanation) -> list[tuple[Way, Explanation]]:
+    """The ways, the likelier first, as all that every vehicle has sees them under random forces.
+
+    With each that set without these. None where they explain little: where they do, what leads a free run
+    away decides which way that follows better.
+    """
+    leading, *others = found
+    if not others or leading.fitter.excess(whole.fit) < LITTLE:
+        return []
+    sea = with_sea(leading.fitter, whole)
+    if as_filtered(leading.fitter, whole).bic < sea.bic + FORCED * sea.fit.samples:
+        return []
+    sets = [whole, *(_taken_so(way.fitter, whole) for way in others)]
+    seas = [sea, *(with_sea(way.fitter, own) for way, own in zip(others, sets[1:], strict=True))]
+    order = sorted(range(len(found)), key=lambda i: seas[i].bic)
+    return [(found[i], sets[i]) for i in order]
 
 
 def _pushed_about(

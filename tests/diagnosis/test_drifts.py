@@ -10,7 +10,7 @@ from hidden_dive import Extra, hidden_dive, nothing
 
 from host.catalogue import ORDINARY, UNKNOWN
 from host.diagnosis.diagnose import diagnose
-from host.diagnosis.disturbances import drifts
+from host.diagnosis.disturbances import drifts, seas
 from host.diagnosis.disturbances.drifts import again_in_drift, among_drift, in_drift
 from host.diagnosis.disturbances.seas import Explained
 from host.diagnosis.fits.drift_fits import beside, drifting
@@ -139,6 +139,23 @@ def test_a_form_of_unknown_physics_may_have_passed_for_drift(
     (with_form,) = (names for names in search.tried if "unknown_force_w_w" in names)
     assert {*ORDINARY} < with_form
     assert not search.tried[with_form].fit.has_coloured_noise
+
+
+@pytest.mark.parametrize(("a_sample", "is_pushed"), [(1.0, True), (0.3, False)])
+def test_forces_that_are_far_likelier_than_drift_end_the_search_for_what_leaves_nothing(
+    gusty: tuple[Fitter, Explanation], monkeypatch: pytest.MonkeyPatch, a_sample: float, is_pushed: bool
+) -> None:
+    fitter, found = gusty
+    search = Search(fitter, Workers(fitter, 1), lambda _: None, fitter.base, fitter.root)
+    forced = replace(found, bic=found.bic - a_sample * found.fit.samples)
+    monkeypatch.setattr(drifts, "drifting", lambda *_: found)
+    monkeypatch.setattr(drifts, "with_sea", lambda *_: forced)
+    monkeypatch.setattr(drifts, "_instead", lambda *_: search.remember(replace(found, names=frozenset())))
+    monkeypatch.setattr(Search, "run_from", lambda *_: found)
+    assert in_drift(search, found) is None
+    assert search.pushed is forced
+    assert search.is_pushed_about == is_pushed
+    assert seas._in_seas(search, found)[1] is forced
 
 
 def test_what_drifts_on_a_part_is_looked_for_on_the_whole(gusty: tuple[Fitter, Explanation]) -> None:

@@ -365,7 +365,7 @@ def test_a_form_beside_all_that_every_vehicle_has_must_leave_white_noise(
 def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> None:
     def way(root: float, there: float) -> Way:
         fitter = SimpleNamespace(root=SimpleNamespace(bic=root, fit=2.0 * MUCH), excess=lambda fit: fit)
-        fitter.there, fitter.polished = SimpleNamespace(bic=there), lambda one: one
+        fitter.there, fitter.polished = SimpleNamespace(bic=there, fit=0.1), lambda one: one
         return Way([], cast("Any", fitter))
 
     def order(*found: Way) -> list[int]:
@@ -403,6 +403,25 @@ def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(plane_choice, "at_the_outset", lambda *_: None)
     monkeypatch.setattr(plane_choice, "by_single_effects", lambda found, *_: found[::-1])
     assert order(moved, held) == [1, 0]
+
+
+@pytest.mark.parametrize(
+    ("left", "gained", "is_told"), [(0.1, 90.0, False), (2.0, 40.0, False), (2.0, 60.0, True)]
+)
+def test_where_forces_lead_they_tell_which_way_the_plane_went(
+    monkeypatch: pytest.MonkeyPatch, left: float, gained: float, is_told: bool
+) -> None:
+    fitters = [SimpleNamespace(sea=-gained, excess=lambda _: left), SimpleNamespace(sea=-gained - 1.0)]
+    found = [Way([], cast("Any", fitter)) for fitter in fitters]
+    whole: Any = SimpleNamespace(bic=0.0, fit=None)
+    other: Any = SimpleNamespace(bic=1.0)
+    monkeypatch.setattr(plane_choice, "_taken_so", lambda *_: other)
+    monkeypatch.setattr(plane_choice, "as_filtered", lambda _, one: one)
+    forced = SimpleNamespace(samples=100)
+    monkeypatch.setattr(plane_choice, "with_sea", lambda f, _: SimpleNamespace(bic=f.sea, fit=forced))
+    seen = plane_choice._as_seen_under_forces(found, whole)
+    assert seen == ([(found[1], other), (found[0], whole)] if is_told else [])
+    assert not plane_choice._as_seen_under_forces(found[:1], whole)  # with nothing to choose from
 
 
 def test_a_diagnosis_begins_with_it_and_ranks_what_pays(real: Fitter) -> None:

@@ -27,7 +27,7 @@ def in_drift(calm: Search, first: Explanation) -> Explained | None:
     """The search from a set of many beside what drifts with it.
 
     None where in the end nothing does, or effects, a form of unknown physics or random forces in the place of
-    what drifts are likelier; the search without it then remembers what was found.
+    what drifts are likelier; the search without it then remembers what was found, and under which forces.
     While sets are compared what drifts stays as it was first found; it is estimated again beside the best.
     """
     fitter, found = calm.fitter, first
@@ -41,8 +41,11 @@ def in_drift(calm: Search, first: Explanation) -> Explained | None:
         if again.bic > found.bic - TWIN_MARGIN or number == ROUNDS - 1:
             break
         found = again
-    instead = _instead(calm, search, found)
-    if with_sea(fitter, found).bic < found.bic - CLEARLY or instead.bic < found.bic - NAMING_MARGIN:
+    instead, sea = _instead(calm, search, found), with_sea(fitter, found)
+    if sea.bic < found.bic - CLEARLY:
+        calm.pushed = sea
+        return None
+    if instead.bic < found.bic - NAMING_MARGIN:
         return None
     return Explained(found, search, leftover(search.fitter, found), None)
 

@@ -108,6 +108,9 @@ def _in_seas(calm: Search, best: Explanation) -> list[Explanation]:
     unstable.
     """
     also = with_sea(calm.fitter, best)
+    if calm.pushed is not None:
+        calm.at_sea = calm.pushed
+        return [also, calm.pushed]
     if calm.steered is None or calm.steered.bic > also.bic + ROUGH:
         return [also]
     if calm.at_sea is None:

@@ -41,7 +41,7 @@ def with_best_offsets(search: "Search") -> Explanation:
     polished = [e for e in polished if e.bic < leading.bic + 2.0 * NAMING_MARGIN]
     if len(leading.names) > LARGEST_SET:
         polished = [leading]
-    explained = [e for e in search.tried.values() if FREE_TRIM.name not in e.names]
+    explained = search.untrimmed
     for counts in ((0, 1), (2,)):
         ways = [frozenset(way) for count in counts for way in combinations(OFFSETS, count)]
         tasks = [(retrimmed, (e, way)) for e in polished for way in ways]

@@ -33,6 +33,7 @@ from host.recordings.recording import Array
 MOST_ROUNDS = 4
 LOST = 10.0  # times the noise floor: forces as slight as this leave no stable hull so far away
 FAR_LIKELIER = 2.0  # of BIC a sample: what no few effects more make up for
+LIKELIER = 0.5  # the same, of forces beside which a search has come to its end
 
 Progress = Callable[[str], None]
 
@@ -47,6 +48,7 @@ class Search:
     rivals  sets that were fitted in an exchange
     joint   sets with all that every vehicle has
     steered  what a continuation found likeliest under forces; `at_sea` under the likeliest, once asked
+    pushed  what was found beside drift, under forces that are likelier in its place
     asks_drift  whether something may drift beside white noise; `adrift` a set beside that, where it is plain
     is_second  it was all searched with the plane the other way, too, where no continuation helped
     outset  the root with all that every vehicle has, where that leaves nothing, or next to nothing
@@ -65,6 +67,7 @@ class Search:
     joint: set[Names] = field(default_factory=set)
     steered: Explanation | None = None
     at_sea: Explanation | None = None
+    pushed: Explanation | None = None
     is_second: bool = False
     outset: Explanation | None = None
     instead: Callable[[], bool] = lambda: False
@@ -82,8 +85,7 @@ class Search:
         self.remember(self.root)
         if self.part is not None or any(len(e.names) > LARGEST_SET for e in also or []):
             self.on_progress("settling")
-            settled = [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
-            found = self._settled(min(settled, key=lambda e: e.bic))
+            found = self._settled(min(self.untrimmed, key=lambda e: e.bic))
             if self.part is None:
                 return told_by_the_usual(self, whole(self, found))
             return self._with_what_a_part_hid(found)
@@ -94,8 +96,13 @@ class Search:
             self.alone = self.alone_so_far()
         beam_search(self)
         if self.is_led_elsewhere:
-            return min((e for e in self.tried.values() if FREE_TRIM.name not in e.names), key=lambda e: e.bic)
+            return min(self.untrimmed, key=lambda e: e.bic)
         return with_best_offsets(self) if self.is_needless else self._concluded()
+
+    @property
+    def untrimmed(self) -> list[Explanation]:
+        """All that was tried without a free trim, which is no physics."""
+        return [e for e in self.tried.values() if FREE_TRIM.name not in e.names]
 
     def run_from(self, joint: Explanation, is_all: bool = False) -> Explanation:
         """The best explanation from a set of many: with what else promises most, pruned and exchanged.
@@ -287,12 +294,14 @@ class Search:
         It may be unstable as well; turns push it, or what is not in the equations at all. A fault of the
         plane's drive that explains most of what moves it does not: then the search goes on beside that.
         """
-        if self.steered is None or not self._is_lost or self.fault_of_the_drive is not None:
-            return False
-        return (
-            self.steered.bic
-            < min(e.bic for e in self.tried.values()) - FAR_LIKELIER * self.steered.fit.samples
-        )
+        is_so = self.pushed is not None and self._are_far_behind(self.pushed, LIKELIER)
+        if self.steered is not None and self._is_lost:
+            is_so |= self._are_far_behind(self.steered, FAR_LIKELIER)
+        return is_so and self.fault_of_the_drive is None
+
+    def _are_far_behind(self, one: Explanation, by: float) -> bool:
+        """Whether all that was tried is less likely than one by so much of BIC a sample."""
+        return one.bic < min(e.bic for e in self.tried.values()) - by * one.fit.samples
 
     @property
     def fault_of_the_drive(self) -> Explanation | None:
