@@ -17,6 +17,7 @@ ABOVE = -0.5  # m: where depth is less than that, it is not counted from the sur
 LONG_ENOUGH, MOSTLY = 15.0, 0.5  # s at the surface, and share of what is above `LEFT`
 DIVES = 2.0  # m: of a vehicle that never goes deeper, and works its plane, depth may count from elsewhere
 KEPT = 0.15  # m, within which half of all depths lie at the surface
+SOON, LINGERS = 30.0, 0.85  # s above `LEFT` at an end, and the share at the surface: half by one that sinks
 SMOOTHED = 5.0  # s, of which the median depth counts: a wave or a spike is no dive
 STILL = 0.01  # rad (a unit of another actuator): a plane that moves no more than this is at rest
 LONGEST_ASCENT = 60.0  # s, for which a vehicle floats up with its plane at rest before it is at the surface
@@ -78,11 +79,20 @@ def _afloat(recording: Recording) -> NDArray[np.bool_]:
         is_at_rest = np.abs(rudder - np.median(rudder)) <= STILL
         if lasting[is_up & is_at_rest].sum() >= max(LONG_ENOUGH, half):
             afloat[_ascent(recording, int(first)) : end] = True
-        elif depth.max() > DIVES and _keeps(depth[first:end][is_up]):
-            # Most missions begin or end so, and little is lost there.
-            least = 0.0 if first == 0 or end == depth.size else LONG_ENOUGH
-            afloat[first:end] |= lasting[is_up].sum() >= max(least, half)
+        elif depth.max() > DIVES and _is_left_at_last(depth, first, end, is_up, lasting):
+            afloat[first:end] = True
     return afloat
+
+
+def _is_left_at_last(depth: Array, first: int, end: int, is_up: NDArray[np.bool_], lasting: Array) -> bool:
+    """Whether a hull that works its plane lies at the surface in these rows, or all but the last of them.
+
+    Most missions begin or end so, and little is lost there: then a short while is enough.
+    """
+    is_an_end, share = first == 0 or end == depth.size, float(lasting[is_up].sum() / lasting.sum())
+    lingers = is_an_end and share > LINGERS and float(lasting.sum()) < SOON
+    keeps = lingers or _keeps(depth[first:end][is_up])
+    return keeps and share >= MOSTLY and (is_an_end or lasting[is_up].sum() >= LONG_ENOUGH)
 
 
 def _keeps(depth: Array) -> bool:

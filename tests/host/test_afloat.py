@@ -118,6 +118,21 @@ def test_a_mission_that_begins_and_ends_at_the_surface_with_its_plane_at_work_is
     assert under_water([shallow]) == [shallow]
 
 
+@pytest.mark.parametrize(
+    ("lingering", "leaving", "is_cut"), [(14.0, 1.5, True), (14.0, 14.0, False), (60.0, 1.5, False)]
+)
+def test_a_hull_that_leaves_the_surface_at_last_has_been_there_till_then(
+    lingering: float, leaving: float, is_cut: bool
+) -> None:
+    """Not one that sinks evenly, nor one that is so shallow for long: its depth may count from elsewhere."""
+    slowly = np.linspace(0.05, 0.48, round(lingering / STEP))
+    depth = np.concatenate(
+        [slowly, np.linspace(0.48, 1.0, round(leaving / STEP)), legs((1.0, 0.0), (9.0, 120.0))]
+    )
+    (dive,) = under_water([recording(depth, flown(depth.size))])
+    assert (dive.duration < depth.size * STEP - 10.0) == is_cut
+
+
 @pytest.mark.parametrize(("seconds", "is_cut"), [(8.0, False), (40.0, True)])
 def test_between_two_dives_a_short_time_near_the_surface_is_no_reason_to_cut(
     seconds: float, is_cut: bool
