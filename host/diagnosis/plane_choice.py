@@ -19,6 +19,7 @@ from host.diagnosis.search.outset import (
     at_the_outset,
     beside_what_leads,
     leads_on,
+    one_that_says_all,
     pushed_by_forces,
     says_all,
 )
@@ -89,12 +90,15 @@ def likelier_first(
     whole = at_the_outset(leading.fitter)
     if whole is not None and says_all(leading.fitter, whole):
         return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
+    one = None
     if may_leave_out and whole is not None and leading.fitter.excess(whole.fit) > MUCH:
-        told, whole = _in_short_runs([leading, *others], whole, on_progress, jobs)
-        if told:
-            return told
+        one = one_that_says_all(leading.fitter, whole, jobs)
+        if one is None:
+            told, whole = _in_short_runs([leading, *others], whole, on_progress, jobs)
+            if told:
+                return told
     if whole is not None:
-        whole = beside_what_leads(leading.fitter, whole, jobs)
+        whole = one or beside_what_leads(leading.fitter, whole, jobs)
     if seen := _among_waves(found):
         on_progress("what every vehicle has, in the waves")
         return _in_a_swell(seen, whole)

@@ -140,7 +140,7 @@ def test_what_keeps_the_plane_back_is_tried_beside_all_as_changes_are(
     likeliest = {"ballast_change": -30.0, "actuator_backlash": -40.0, "rudder_stall": -20.0}
 
     def grown(_: Fitter, parent: Explanation, name: str, __: list[Array]) -> Explanation:
-        return Explanation(frozenset({name}), parent.fit, likeliest.get(name, 0.0))
+        return Explanation(parent.names | {name}, parent.fit, likeliest.get(name, 0.0))
 
     def with_all(_: Fitter, one: Explanation) -> Explanation:
         beside.append(one.bic)
@@ -151,6 +151,7 @@ def test_what_keeps_the_plane_back_is_tried_beside_all_as_changes_are(
         return whole
 
     monkeypatch.setattr(Fitter, "grown", grown)
+    monkeypatch.setattr(real, "at_first", {})
     monkeypatch.setattr(outset, "all_beside", with_all)
     monkeypatch.setattr(outset, "_by_fewer", by_fewer)
     monkeypatch.setattr(outset, "_is_no_chance", lambda *_: True)
@@ -178,12 +179,55 @@ def test_what_leads_must_be_more_than_a_part_of_a_sea(
     name: str, left: float, counts: bool, real: Fitter, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fit = real.base.fit
-    monkeypatch.setattr(Fitter, "grown", lambda *a: Explanation(frozenset({a[2]}), fit, 0.0))
+    monkeypatch.setattr(Fitter, "grown", lambda *a: Explanation(a[1].names | {a[2]}, fit, 0.0))
+    monkeypatch.setattr(real, "at_first", {})
     monkeypatch.setattr(outset, "all_beside", lambda _, one: one)
     monkeypatch.setattr(outset, "_by_fewer", lambda *a: a[2])
-    monkeypatch.setattr(real, "excess", lambda of: left if of is fit else 10.0)
+    monkeypatch.setattr(real, "excess", lambda of: left if of.noise is fit.noise else 10.0)
     found = outset._beside_what_leads(real, real.root, (name,), 1)
-    assert {n for one in found for n in one.names} == ({name} if counts else set())
+    assert {n for one in found for n in one.names} - real.root.names == ({name} if counts else set())
+
+
+@pytest.mark.parametrize(
+    ("is_white", "left", "says_all"), [(True, 1.1, True), (True, 1.2, False), (False, 1.1, False)]
+)
+def test_one_effect_that_leaves_nothing_is_found_before_stretches_are_left_out(
+    is_white: bool, left: float, says_all: bool, real: Fitter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+
+    def grown(_: Fitter, parent: Explanation, name: str, __: list[Array]) -> Explanation:
+        asked.append(name)
+        return Explanation(parent.names | {name}, parent.fit, -float(name == "rudder_stall"))
+
+    monkeypatch.setattr(Fitter, "grown", grown)
+    monkeypatch.setattr(real, "at_first", {})
+    monkeypatch.setattr(real, "excess", lambda _: left)
+    monkeypatch.setattr(Explanation, "leaves_white", is_white)
+    found = outset.one_that_says_all(real, real.root, 1)
+    assert (found is not None and "rudder_stall" in found.names) == says_all
+    monkeypatch.setattr(outset, "all_beside", lambda _, one: one)
+    monkeypatch.setattr(outset, "_by_fewer", lambda *a: a[2])
+    outset._beside_what_leads(real, real.root, (*DRIVE, *IN_TIME), 1)
+    assert asked == [*DRIVE, *IN_TIME]  # each fitted once
+
+
+def test_no_stretch_is_left_out_of_what_one_effect_explains(monkeypatch: pytest.MonkeyPatch) -> None:
+    fitter: Any = SimpleNamespace(
+        root=SimpleNamespace(bic=0.0), excess=lambda fit: fit, polished=lambda one: one
+    )
+    whole: Any = SimpleNamespace(bic=0.0, fit=2.0 * MUCH, names=MANY, leaves_white=False)
+    stall: Any = SimpleNamespace(bic=-9.0, fit=0.1, names={"rudder_stall"}, leaves_white=True)
+    monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: whole)
+    monkeypatch.setattr(plane_choice, "one_that_says_all", lambda *_: stall)
+    monkeypatch.setattr(plane_choice, "_in_short_runs", lambda *_: pytest.fail("it is explained"))
+    monkeypatch.setattr(plane_choice, "beside_what_leads", lambda *_: pytest.fail("it leads"))
+    monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)
+    monkeypatch.setattr(plane_choice, "leads_on", lambda *_: True)
+    monkeypatch.setattr(plane_choice, "_led", lambda *_: [])
+    monkeypatch.setattr(plane_choice, "_pushed_about", lambda *_: [])
+    (way,) = likelier_first([Way([], fitter)], lambda _: None, 1, may_leave_out=True)
+    assert way.outset is stall
 
 
 @pytest.mark.parametrize(("left", "asked"), [(MUCH - 0.1, []), (MUCH + 0.1, [(*DRIVE, *IN_TIME)])])

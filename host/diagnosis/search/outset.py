@@ -77,16 +77,36 @@ def beside_what_leads(fitter: Fitter, best: Explanation, jobs: int = 1) -> Expla
     Or, if that promises most, goes with the depth. Where it leads nowhere; where it leaves much, beside all
     these but what changes.
     """
-    names: tuple[str, ...] = (*DRIVE, *IN_TIME)
-    if fitter.excess(best.fit) > LOST:
-        names = (*SCANS, *names)
-    else:
+    names = _what_may_lead(fitter, best)
+    if fitter.excess(best.fit) < LOST:
         best = min(best, _by_fewer(fitter, fitter.root, best, jobs), key=lambda e: e.bic)
     if fitter.excess(best.fit) < MUCH:
         return best
     layers = _layers(fitter, best)
     led = _beside_what_leads(fitter, best, (*names, *layers), jobs)
     return min([best, *led, *_joined_by(fitter, best, layers, jobs)], key=lambda e: e.bic)
+
+
+def one_that_says_all(fitter: Fitter, whole: Explanation, jobs: int) -> Explanation | None:
+    """The likeliest of what may lead, alone, if it leaves nothing: no turn is explained so."""
+    alone = _each_alone(fitter, _what_may_lead(fitter, whole), jobs)
+    best = min(alone, key=lambda e: e.bic)
+    return best if best.leaves_white and fitter.excess(best.fit) < LITTLE else None
+
+
+def _what_may_lead(fitter: Fitter, whole: Explanation) -> tuple[str, ...]:
+    is_lost = fitter.excess(whole.fit) > LOST
+    return (*SCANS, *DRIVE, *IN_TIME) if is_lost else (*DRIVE, *IN_TIME)
+
+
+def _each_alone(fitter: Fitter, names: Iterable[str], jobs: int) -> list[Explanation]:
+    """Each of these beside the root, fitted once."""
+    sets = {name: fitter.root.names | {name} for name in names}
+    asked = [name for name, own in sets.items() if own not in fitter.at_first]
+    with Workers(fitter, jobs) as workers:
+        found = workers.results([(Fitter.grown, (fitter.root, name, [])) for name in asked])
+    fitter.at_first |= {one.names: one.lean() for one in found}
+    return [fitter.at_first[own] for own in sets.values()]
 
 
 def _layers(fitter: Fitter, whole: Explanation) -> list[str]:
@@ -158,12 +178,10 @@ def _beside_what_leads(
 
     whole  all that every vehicle has without these
     """
+    leading = sorted(_each_alone(fitter, names, jobs), key=lambda e: e.bic)[:LEADING]
+    if leading[0].leaves_white and fitter.excess(leading[0].fit) < LITTLE:
+        return leading[:1]
     with Workers(fitter, jobs) as workers:
-        alone = workers.results([(Fitter.grown, (fitter.root, name, [])) for name in names])
-        fitter.at_first |= {one.names: one.lean() for one in alone}
-        leading: list[Explanation] = sorted(alone, key=lambda e: e.bic)[:LEADING]
-        if leading[0].leaves_white and fitter.excess(leading[0].fit) < LITTLE:
-            return leading[:1]
         beside: list[Explanation] = workers.results([(all_beside, (one,)) for one in leading])
     best, begun = min(zip(beside, leading, strict=True), key=lambda pair: pair[0].bic)
     found = [*leading, *beside]
