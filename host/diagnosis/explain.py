@@ -64,7 +64,7 @@ def explain(
         drift = in_drift(search, search.adrift)
         if drift is not None and drift.left.is_nothing:
             return drift
-        if search.is_pushed_about:
+        if search.is_pushed_about:  # then no free run will tell more
             best = min(search.untrimmed, key=lambda e: e.bic)
         else:
             again = again or _many_in(fitter, search.tried.values())

@@ -189,23 +189,29 @@ def test_what_leads_must_be_more_than_a_part_of_a_sea(
 
 
 @pytest.mark.parametrize(
-    ("is_white", "left", "says_all"), [(True, 1.1, True), (True, 1.2, False), (False, 1.1, False)]
+    ("leads", "is_white", "left", "says_all"),
+    [
+        ("rudder_stall", True, 1.1, True),
+        ("rudder_stall", True, 1.2, False),
+        ("rudder_stall", False, 1.1, False),
+        ("unknown_wandering_moment", True, 1.1, False),  # which follows a turn as well
+    ],
 )
 def test_one_effect_that_leaves_nothing_is_found_before_stretches_are_left_out(
-    is_white: bool, left: float, says_all: bool, real: Fitter, monkeypatch: pytest.MonkeyPatch
+    leads: str, is_white: bool, left: float, says_all: bool, real: Fitter, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[str] = []
 
     def grown(_: Fitter, parent: Explanation, name: str, __: list[Array]) -> Explanation:
         asked.append(name)
-        return Explanation(parent.names | {name}, parent.fit, -float(name == "rudder_stall"))
+        return Explanation(parent.names | {name}, parent.fit, -float(name == leads))
 
     monkeypatch.setattr(Fitter, "grown", grown)
     monkeypatch.setattr(real, "at_first", {})
     monkeypatch.setattr(real, "excess", lambda _: left)
     monkeypatch.setattr(Explanation, "leaves_white", is_white)
     found = outset.one_that_says_all(real, real.root, 1)
-    assert (found is not None and "rudder_stall" in found.names) == says_all
+    assert (found is not None and leads in found.names) == says_all
     monkeypatch.setattr(outset, "all_beside", lambda _, one: one)
     monkeypatch.setattr(outset, "_by_fewer", lambda *a: a[2])
     outset._beside_what_leads(real, real.root, (*DRIVE, *IN_TIME), 1)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.catalogue import ALONG_THE_HULL, DRIVE, FAINT, NEAR_THE_SURFACE, ORDINARY
+from host.catalogue import ALONG_THE_HULL, DRIVE, FAINT, NEAR_THE_SURFACE, ORDINARY, UNKNOWN
 from host.catalogue.kin import OFFSETS
 from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
@@ -88,10 +88,11 @@ def beside_what_leads(fitter: Fitter, best: Explanation, jobs: int = 1) -> Expla
 
 
 def one_that_says_all(fitter: Fitter, whole: Explanation, jobs: int) -> Explanation | None:
-    """The likeliest of what may lead, alone, if it leaves nothing: no turn is explained so."""
+    """The likeliest of what may lead, alone, if it leaves nothing: no turn is explained so, but by a form."""
     alone = _each_alone(fitter, _what_may_lead(fitter, whole), jobs)
     best = min(alone, key=lambda e: e.bic)
-    return best if best.leaves_white and fitter.excess(best.fit) < LITTLE else None
+    is_all = best.leaves_white and fitter.excess(best.fit) < LITTLE
+    return best if is_all and best.names.isdisjoint(UNKNOWN) else None
 
 
 def _what_may_lead(fitter: Fitter, whole: Explanation) -> tuple[str, ...]:
