@@ -81,7 +81,8 @@ def likelier_first(
 
     That is all that every vehicle has, where nothing is left beside it; else plain waves, where there are
     any, with all that where it is likelier; else all that every vehicle has, where random forces account for
-    what is left, or next to nothing is; else single effects.
+    what is left, or next to nothing is; else single effects. Where these forces explain far more without
+    accounting for it all, they tell which way.
 
     may_leave_out  whether stretches may be left out without which nothing is left beside it
     """
@@ -219,7 +220,7 @@ def _as_seen_under_forces(found: list[Way], whole: Explanation) -> list[tuple[Wa
     sea = with_sea(leading.fitter, whole)
     if as_filtered(leading.fitter, whole).bic < sea.bic + FORCED * sea.fit.samples:
         return []
-    sets = [whole, *(_taken_so(way.fitter, whole) for way in others)]
+    sets = [whole, *(way.outset or _taken_so(way.fitter, whole) for way in others)]
     seas = [sea, *(with_sea(way.fitter, own) for way, own in zip(others, sets[1:], strict=True))]
     order = sorted(range(len(found)), key=lambda i: seas[i].bic)
     return [(found[i], sets[i]) for i in order]

@@ -1,0 +1,94 @@
+"""Which way the plane is taken between rows, by what tells more than the base equations do."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from host.catalogue import ORDINARY
+from host.diagnosis import plane_choice
+from host.diagnosis.fits.margins import MUCH
+from host.diagnosis.plane_choice import Way, likelier_first
+
+MANY = frozenset({*ORDINARY})
+
+
+def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> None:
+    def way(root: float, there: float) -> Way:
+        fitter = SimpleNamespace(root=SimpleNamespace(bic=root, fit=2.0 * MUCH), excess=lambda fit: fit)
+        fitter.there, fitter.polished = SimpleNamespace(bic=there, fit=0.1), lambda one: one
+        return Way([], cast("Any", fitter))
+
+    def order(*found: Way) -> list[int]:
+        told = likelier_first([*found], lambda _: None, 1)
+        return [[each.fitter for each in found].index(each.fitter) for each in told]
+
+    monkeypatch.setattr(plane_choice, "_taken_so", lambda fitter, _: fitter.there)
+    whole: Any = SimpleNamespace(bic=-10.0, names=MANY, leaves_white=True, fit=0.1)
+    held, moved, worse = way(-2.0, np.nan), way(-1.0, -11.0), way(-1.0, -9.0)
+    monkeypatch.setattr(plane_choice, "at_the_outset", lambda *_: whole)
+    monkeypatch.setattr(plane_choice, "plain_waves", None)  # nothing is left to see
+    monkeypatch.setattr(plane_choice, "beside_what_leads", lambda _, one, __: one)
+    assert order(moved, held) == [0, 1]
+    assert order(worse, held) == [1, 0]
+    assert likelier_first([held], lambda _: None, 1)[0].outset is whole
+    whole.leaves_white = False
+    waves: Any = SimpleNamespace(bic=-20.0)
+    monkeypatch.setattr(plane_choice, "plain_waves", lambda _: waves)
+    monkeypatch.setattr(plane_choice, "_in_a_swell", lambda seen, _: seen)
+    assert [each.outset for each in likelier_first([moved, held], lambda _: None, 1)] == [None, None]
+    monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)
+    led: Any = SimpleNamespace(bic=-40.0)
+    monkeypatch.setattr(plane_choice, "_pushed_about", lambda *_: pytest.fail("asked of what a filter leads"))
+    monkeypatch.setattr(plane_choice, "_led", lambda ways, *_: [ways[0]._replace(pushed=led)])
+    assert likelier_first([moved, held], lambda _: None, 1)[0].pushed is led
+    monkeypatch.setattr(plane_choice, "_led", lambda *_: [])
+    monkeypatch.setattr(plane_choice, "_pushed_about", lambda *_: [])
+    assert order(moved, held) == [0, 1]
+    assert likelier_first([held], lambda _: None, 1)[0].outset is whole
+    pushed: Any = SimpleNamespace(bic=-30.0)
+    monkeypatch.setattr(plane_choice, "_pushed_about", lambda ways, *_: [ways[0]._replace(pushed=pushed)])
+    (first,) = likelier_first([held], lambda _: None, 1)
+    assert first.pushed is pushed  # which is asked where something is left
+    assert first.outset is whole  # if it is not believed
+    monkeypatch.setattr(plane_choice, "at_the_outset", lambda *_: None)
+    monkeypatch.setattr(plane_choice, "by_single_effects", lambda found, *_: found[::-1])
+    assert order(moved, held) == [1, 0]
+
+
+@pytest.mark.parametrize(
+    ("left", "gained", "is_told"), [(0.1, 90.0, False), (2.0, 40.0, False), (2.0, 60.0, True)]
+)
+def test_where_forces_lead_they_tell_which_way_the_plane_went(
+    monkeypatch: pytest.MonkeyPatch, left: float, gained: float, is_told: bool
+) -> None:
+    fitters = [SimpleNamespace(sea=-gained, excess=lambda _: left), SimpleNamespace(sea=-gained - 1.0)]
+    found = [Way([], cast("Any", fitter)) for fitter in fitters]
+    whole: Any = SimpleNamespace(bic=0.0, fit=None)
+    other: Any = SimpleNamespace(bic=1.0)
+    monkeypatch.setattr(plane_choice, "_taken_so", lambda *_: other)
+    monkeypatch.setattr(plane_choice, "as_filtered", lambda _, one: one)
+    forced = SimpleNamespace(samples=100)
+    monkeypatch.setattr(plane_choice, "with_sea", lambda f, _: SimpleNamespace(bic=f.sea, fit=forced))
+    seen = plane_choice._as_seen_under_forces(found, whole)
+    assert seen == ([(found[1], other), (found[0], whole)] if is_told else [])
+    assert not plane_choice._as_seen_under_forces(found[:1], whole)  # with nothing to choose from
+
+
+def test_no_stretch_is_left_out_of_what_one_effect_explains(monkeypatch: pytest.MonkeyPatch) -> None:
+    fitter: Any = SimpleNamespace(
+        root=SimpleNamespace(bic=0.0), excess=lambda fit: fit, polished=lambda one: one
+    )
+    whole: Any = SimpleNamespace(bic=0.0, fit=2.0 * MUCH, names=MANY, leaves_white=False)
+    stall: Any = SimpleNamespace(bic=-9.0, fit=0.1, names={"rudder_stall"}, leaves_white=True)
+    monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: whole)
+    monkeypatch.setattr(plane_choice, "one_that_says_all", lambda *_: stall)
+    monkeypatch.setattr(plane_choice, "_in_short_runs", lambda *_: pytest.fail("it is explained"))
+    monkeypatch.setattr(plane_choice, "beside_what_leads", lambda *_: pytest.fail("it leads"))
+    monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)
+    monkeypatch.setattr(plane_choice, "leads_on", lambda *_: True)
+    monkeypatch.setattr(plane_choice, "_led", lambda *_: [])
+    monkeypatch.setattr(plane_choice, "_pushed_about", lambda *_: [])
+    (way,) = likelier_first([Way([], fitter)], lambda _: None, 1, may_leave_out=True)
+    assert way.outset is stall
