@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from host.recordings.recording import Array, Recording
 from host.recordings.rounding import lattice, quantum
@@ -9,6 +10,9 @@ from host.recordings.rounding import lattice, quantum
 FINEST = np.array([1e-5, 1e-4])  # rad, m; finer steps matter to no model
 RULES = 0.25  # of a channel's noise variance; where rounding is less, it is as good as normal
 ORDER = 4  # differences; a smooth motion vanishes in them, white noise grows by a known factor
+USUAL = 2.5  # deviations, within which differences count: those across a step of the plane are larger
+CUT = 1.0 - 2.0 * USUAL * norm.pdf(USUAL) / (2.0 * norm.cdf(USUAL) - 1.0)  # of the variance, within these
+MOST_ROUNDS = 10
 
 
 def noise_floor(recordings: list[Recording]) -> Array:
@@ -31,9 +35,10 @@ def is_quantised(recordings: list[Recording]) -> NDArray[np.bool_]:
 def white_noise(pieces: list[Array]) -> float:
     """Variance of the white noise in a channel's pieces (N,), NaN where it was not measured.
 
-    The median magnitude of fourth differences, over that of unit white noise: plane steps are rare enough
-    not to move a median. Rounded readings have few differences, among which a median says little: they are
-    dithered first. Rounding is the least noise of a channel.
+    That of fourth differences within 2.5 deviations, begun with their median, over that of unit white noise:
+    plane steps are rare and move neither, and it errs a quarter less than the median does. Rounded readings
+    have few differences, among which it says little: they are dithered first. Rounding is the least noise of
+    a channel.
     """
     gain = np.sqrt(sum(_binomial(ORDER, k) ** 2 for k in range(ORDER + 1)))
     step, rng = quantum(pieces), np.random.default_rng(0)
@@ -41,9 +46,19 @@ def white_noise(pieces: list[Array]) -> float:
     known = [piece[np.isfinite(piece)] for piece in pieces]
     dithered = [values + rng.uniform(-0.5 * step, 0.5 * step, values.size) for values in known]
     differences = np.concatenate([np.diff(values, ORDER) for values in dithered])
-    spread = np.median(np.abs(differences)) / 0.6745 / gain if differences.size >= 20 else 0.0
+    spread = _usual_deviation(differences) / gain if differences.size >= 20 else 0.0
     rounding = step**2 / 12.0
     return float(max(spread**2 - rounding, rounding, 1e-12))
+
+
+def _usual_deviation(values: Array) -> float:
+    """The deviation of normal values (N,), some of which are something else's."""
+    size = np.abs(values)
+    deviation = float(np.median(size)) / 0.6745
+    for _ in range(MOST_ROUNDS):
+        usual = size[size <= USUAL * deviation]
+        deviation = float(np.sqrt(np.mean(usual**2) / CUT))
+    return deviation
 
 
 def _binomial(n: int, k: int) -> int:

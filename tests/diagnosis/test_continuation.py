@@ -183,7 +183,7 @@ def test_a_damping_that_began_at_next_to_nothing_grows(monkeypatch: pytest.Monke
     idle = {"a2": -0.008, "a3": -0.52, "b2": -1.1, "c_qw": 2.9, "c_qq": -18.9}
     start = begun_with(fitter, SHORT | idle, STAGES[0])
     a2 = start.structure.names.index("a2")
-    assert module._climbed(fitter, start, 10).fit.parameters[a2] == pytest.approx(SHORT["a2"], rel=0.6)
+    assert module._climbed(fitter, start, 10).fit.parameters[a2] == pytest.approx(SHORT["a2"], rel=0.7)
     monkeypatch.setattr(straightened, "HARDLY_DAMPS", 0.0)
     assert module._climbed(fitter, start, 10).fit.parameters[a2] > -0.1
 

@@ -164,19 +164,21 @@ def test_what_keeps_the_plane_back_is_tried_beside_all_as_changes_are(
 
 
 @pytest.mark.parametrize(
-    ("name", "left", "counts"),
+    ("name", "left", "is_white", "counts"),
     [
-        ("unknown_swinging_moment", LITTLE - 0.1, True),
-        ("unknown_swinging_moment", LITTLE + 0.1, False),  # of many waves it follows one
-        ("rudder_stall", 4.9, True),
-        ("rudder_stall", 5.1, False),
-        ("ballast_change", 9.0, True),
+        ("unknown_swinging_moment", LITTLE - 0.1, False, True),
+        ("unknown_swinging_moment", LITTLE + 0.1, False, False),  # of many waves it follows one
+        ("unknown_swinging_moment", LITTLE + 0.1, True, True),
+        ("rudder_stall", 4.9, False, True),
+        ("rudder_stall", 5.1, False, False),
+        ("ballast_change", 9.0, False, True),
     ],
 )
 def test_what_leads_must_be_more_than_a_part_of_a_sea(
-    name: str, left: float, counts: bool, real: Fitter, monkeypatch: pytest.MonkeyPatch
+    name: str, left: float, is_white: bool, counts: bool, real: Fitter, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fit = real.base.fit
+    monkeypatch.setattr(Explanation, "leaves_white", is_white)
     monkeypatch.setattr(Fitter, "grown", lambda *a: Explanation(a[1].names | {a[2]}, fit, 0.0))
     monkeypatch.setattr(real, "at_first", {})
     monkeypatch.setattr(outset, "all_beside", lambda _, one: one)
@@ -189,8 +191,8 @@ def test_what_leads_must_be_more_than_a_part_of_a_sea(
 @pytest.mark.parametrize(
     ("leads", "is_white", "left", "says_all"),
     [
-        ("rudder_stall", True, 1.1, True),
-        ("rudder_stall", True, 1.2, False),
+        ("rudder_stall", True, MUCH - 0.1, True),
+        ("rudder_stall", True, MUCH + 0.1, False),
         ("rudder_stall", False, 1.1, False),
         ("unknown_wandering_moment", True, 1.1, False),  # which follows a turn as well
     ],

@@ -146,6 +146,20 @@ def test_a_form_that_hardly_betters_what_is_known_is_no_lone_one() -> None:
         assert not any(names & UNKNOWN.keys() for names in search.tried)
 
 
+def test_a_form_that_was_fitted_at_the_outset_is_known_though_a_step_promises_little(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fitter = Fitter([hidden_dive(duration=20.0)])
+    root = fitter.root
+    swinging = replace(root, names=root.names | {"unknown_swinging_moment"}, bic=root.bic - 100.0)
+    changed = replace(root, names=root.names | {"ballast_change"}, bic=root.bic - 200.0)
+    fitter.at_first |= {one.names: one for one in (swinging, changed)}
+    monkeypatch.setattr("host.diagnosis.search.lone_form.form_gains", lambda *_: {})
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, root)
+        assert lone_form(search, root) is swinging  # of the catalogue nothing is asked here
+
+
 def test_what_wanders_with_time_gives_way_to_what_every_vehicle_has(monkeypatch: pytest.MonkeyPatch) -> None:
     fitter = Fitter([hidden_dive(duration=20.0)])
     search = Search(fitter, Workers(fitter, 1), lambda _: None, fitter.base, fitter.root)

@@ -5,6 +5,7 @@ Where that leaves little, what every vehicle has would only imitate it: a long s
 
 from typing import TYPE_CHECKING
 
+from host.catalogue import UNKNOWN
 from host.catalogue.unknown import AS_OF_PLANE
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.margins import LITTLE, MUCH, NAMING_MARGIN, margin
@@ -35,7 +36,9 @@ def lone_form(search: "Search", leading: Explanation) -> Explanation | None:
         for name in likely_forms(gains, max(NAMING_MARGIN, FAIR_PART * (parent.bic - leading.bic)))
     ]
     grown = search.workers.results(tasks)
-    best: Explanation = min([leading, *grown], key=lambda e: e.bic)
+    # Of a swing that bends the base a step foretells little; those that were fitted at the outset are known.
+    known = [one for one in search.fitter.at_first.values() if one.names & UNKNOWN.keys()]
+    best: Explanation = min([leading, *grown, *known], key=lambda e: e.bic)
     if _is_enough(search, best, leading):
         return best
     if search.fitter.excess(best.fit) > HOPELESS:

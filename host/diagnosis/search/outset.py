@@ -91,8 +91,7 @@ def one_that_says_all(fitter: Fitter, whole: Explanation, jobs: int) -> Explanat
     """The likeliest of what may lead, alone, if it leaves nothing: no turn is explained so, but by a form."""
     alone = _each_alone(fitter, _what_may_lead(fitter, whole), jobs)
     best = min(alone, key=lambda e: e.bic)
-    is_all = best.leaves_white and fitter.excess(best.fit) < LITTLE
-    return best if is_all and best.names.isdisjoint(UNKNOWN) else None
+    return best if says_all(fitter, best) and best.names.isdisjoint(UNKNOWN) else None
 
 
 def _what_may_lead(fitter: Fitter, whole: Explanation) -> tuple[str, ...]:
@@ -180,7 +179,7 @@ def _beside_what_leads(
     whole  all that every vehicle has without these
     """
     leading = sorted(_each_alone(fitter, names, jobs), key=lambda e: e.bic)[:LEADING]
-    if leading[0].leaves_white and fitter.excess(leading[0].fit) < LITTLE:
+    if says_all(fitter, leading[0]):
         return leading[:1]
     with Workers(fitter, jobs) as workers:
         beside: list[Explanation] = workers.results([(all_beside, (one,)) for one in leading])
@@ -194,7 +193,7 @@ def _beside_what_leads(
 def _is_no_chance(fitter: Fitter, led: Explanation, whole: Explanation) -> bool:
     """Whether what leads does more than follow a part of a sea, as many may a little."""
     left = fitter.excess(led.fit)
-    if left < LITTLE or led.names & {*SCANS}:
+    if left < LITTLE or says_all(fitter, led) or led.names & {*SCANS}:
         return True
     return led.names.isdisjoint(IN_TIME) and left < HALF * fitter.excess(whole.fit)
 
