@@ -191,7 +191,7 @@ def _diagnosed(
     stds = np.array([std.get(name, 0.0) for name in NAMES])
     hardly = [left_open(found.fit.parameters, stds)] * (judged.verdict == "no_mismatch")
     return Diagnosis(
-        verdict=_with_apart(judged.verdict, way),
+        verdict=_on_all(judged.verdict, way),
         recordings=recordings,
         floor=floor,
         base=base,
@@ -225,9 +225,10 @@ def _apart(way: Way) -> str:
     )
 
 
-def _with_apart(verdict: Verdict, way: Way) -> Verdict:
-    """The verdict on all of a recording, of which stretches were left out."""
-    return "partly_explained" if way.apart and verdict in ("explained", "no_mismatch") else verdict
+def _on_all(verdict: Verdict, way: Way) -> Verdict:
+    """The verdict on all of a recording of which stretches were left out, or a plane known in part."""
+    is_of_part = way.apart or way.is_astray
+    return "partly_explained" if is_of_part and verdict in ("explained", "no_mismatch") else verdict
 
 
 def _is_likelier(other: Way, explained: Explained) -> bool:
@@ -263,7 +264,7 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
 
 def _horizon(left: Leftover) -> float | None:
     """s, how far ahead is foretold where forces too weak for a sea lead any free run away; else None."""
-    return HORIZON if left.is_by_speed or left.is_no_sea else None
+    return HORIZON if left.is_of_what_drives or left.is_no_sea else None
 
 
 def _named(

@@ -5,7 +5,7 @@ from functools import cached_property
 
 from host.catalogue import UNKNOWN
 from host.catalogue.nuisance import FREE_TRIM
-from host.diagnosis.disturbances.all_at_sea import again_in_a_swell, in_a_swell, pushed_about
+from host.diagnosis.disturbances.all_at_sea import again_in_a_swell, among_forces, in_a_swell, pushed_about
 from host.diagnosis.disturbances.drifts import again_in_drift, among_drift, in_drift
 from host.diagnosis.disturbances.seas import (
     Explained,
@@ -107,6 +107,8 @@ def _begun_with_all(search: Search, way: Way) -> Explained | None:
     And among waves without which all of it is far from the recording.
     """
     if way.pushed is not None:
+        if way.is_astray and way.calm is not None:
+            return among_forces(search, way.pushed, way.calm)
         return pushed_about(search, way.pushed, are_far_likelier=way.calm is not None)
     found = None if way.swell is None else in_a_swell(search, way.swell)
     if found is None and way.waves is not None and way.calm is not None:

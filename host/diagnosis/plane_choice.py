@@ -12,6 +12,7 @@ from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN, margin
 from host.diagnosis.fits.sea_fits import as_filtered, with_sea, with_waves
 from host.diagnosis.fits.workers import Workers
+from host.diagnosis.plane_astray import astray_share, whole_astray
 from host.diagnosis.recordings.spans import divide, excerpt
 from host.diagnosis.search.apart import BENT, stretches_apart
 from host.diagnosis.search.led_by_filter import led_by_a_filter
@@ -28,7 +29,7 @@ from host.diagnosis.search.short_runs import followed_shortly, short_runs
 from host.diagnosis.search.whole_vehicle import is_real, with_all_ordinary
 from host.likelihood.valleys import look_alikes
 from host.recordings.left_out import Span, without
-from host.recordings.plane_between_rows import ways_between
+from host.recordings.plane_between_rows import ways_between, with_plane_astray
 from host.recordings.recording import Recording
 
 FAR_LIKELIER = 1.0  # of BIC a sample: what no search without waves makes up for
@@ -49,6 +50,7 @@ class Way(NamedTuple):
     pushed  the same under random forces, where nothing in the catalogue gains beside these
     alone  each effect alone, where these were fitted
     apart  stretches of the recording, s, in which other physics acts, and which were left out
+    is_astray  the plane moved between rows as they do not show, and `pushed` is beside that
     """
 
     recordings: list[Recording]
@@ -60,6 +62,7 @@ class Way(NamedTuple):
     pushed: Explanation | None = None
     alone: tuple[Explanation, ...] = ()
     apart: tuple[Span, ...] = ()
+    is_astray: bool = False
 
 
 def ways(recordings: list[Recording]) -> list[Way]:
@@ -103,6 +106,8 @@ def likelier_first(
     if seen := _among_waves(found):
         on_progress("what every vehicle has, in the waves")
         return _in_a_swell(seen, whole)
+    if whole is not None and (astray := _astray([leading, *others], whole, on_progress)):
+        return astray
     if may_leave_out and whole is not None and leading.fitter.excess(whole.fit) > BENT:
         on_progress("stretches of other physics, as most tell")
         short = short_runs(leading.recordings, whole)
@@ -190,6 +195,26 @@ def _in_a_swell(seen: list[Way], whole: Explanation | None) -> list[Way]:
     if swell is None:
         return begun
     return [way._replace(swell=own) for way, own in _as_seen_by(begun, swell)]
+
+
+def _astray(found: list[Way], whole: Explanation, on_progress: Callable[[str], None]) -> list[Way]:
+    """The way whose plane moved on, if more often than its rows show, as all that every vehicle has sees it.
+
+    Under random forces, and where these explain far more than it does alone; else none.
+    """
+    moving = [way for way in found if any(one.plane_moved is not None for one in way.recordings)]
+    if not moving or found[0].fitter.excess(whole.fit) < MUCH:
+        return []
+    on_progress("a plane that moved more often than it was recorded")
+    fitter, calm = moving[0].fitter, whole if moving[0] is found[0] else _taken_so(moving[0].fitter, whole)
+    sea = with_sea(fitter, calm)
+    if as_filtered(fitter, calm).bic < sea.bic + FORCED * sea.fit.samples:
+        return []
+    if not (share := astray_share(fitter)):
+        return []
+    recordings = [with_plane_astray(one, share) for one in moving[0].recordings]
+    fitter = Fitter(excerpt(divide(recordings).teaching))
+    return [Way(recordings, fitter, pushed=whole_astray(fitter), calm=calm, is_astray=True)]
 
 
 def _led(

@@ -268,6 +268,7 @@ def _blank(flown: Manoeuvre, like: Recording) -> Recording:
         rudder=flown.rudder,
         plane=None,
         plane_doubt=None,
+        plane_moved=None,
         step=flown.step,
     )
 

@@ -42,6 +42,7 @@ class Inputs:
     steps     (2,) of the rounding of pitch and depth where it rules, else 0
     whitening  of pitch and of depth, where more than white noise is in them
     unseen     the same of both, where the plane stepped unseen
+    astray     rad (N,), deviation of the plane's mean angle in a row where it moved unseen; empty if nowhere
     shared     larger equations that are evaluated in place of the structure's own, if any; what these lack
                acts nowhere where its parameters are 0, and moves no state of its own
     """
@@ -54,6 +55,7 @@ class Inputs:
     steps: Array = field(default_factory=lambda: np.zeros(2))
     whitening: Whitenings = NOT_WHITENED
     unseen: UnseenPlane | None = None
+    astray: Array = field(default_factory=lambda: NONE)
     shared: Structure | None = None
     before: Array = field(default_factory=lambda: np.zeros((FIRST_LAG, 0)))
 
@@ -126,8 +128,15 @@ def inputs_of(
         substeps=int(np.ceil(recording.step / max(longest_substep, recording.step / MOST_SUBSTEPS) - 1e-6)),
         steps=steps,
         whitening=whitening,
+        astray=astray(recording),
         before=_before(recording, lags),
     )
+
+
+def astray(recording: Recording, share: float | None = None) -> Array:
+    """The `Inputs.astray` of a recording, or with another share of what its plane moved."""
+    share = recording.plane_astray if share is None else share
+    return NONE if recording.plane_moved is None or not share else share * np.abs(recording.plane_moved)
 
 
 def _before(recording: Recording, lags: int) -> Array:

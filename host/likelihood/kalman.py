@@ -1,4 +1,8 @@
-"""Kalman filter over a recording: innovations when random forces act on the vehicle."""
+"""Kalman filter over a recording: innovations when random forces act on the vehicle.
+
+Or a plane that moved between the rows as they do not show: of a deviation s_k of its mean angle in row k, the
+state after it has the covariance g g^T s_k^2 more, g what an angle does to it within the row.
+"""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,6 +20,16 @@ from host.recordings.recording import Array
 @lru_cache(KEPT)
 def _kalman(form: Form) -> ca.Function:
     """One step of the extended Kalman filter with white force and moment noise; gives e, S and K."""
+    return _filter_step(form, may_stray=False)
+
+
+@lru_cache(KEPT)
+def _kalman_astray(form: Form) -> ca.Function:
+    """The same where the plane's mean angle in a row is known but for a deviation, which comes last."""
+    return _filter_step(form, may_stray=True)
+
+
+def _filter_step(form: Form, may_stray: bool) -> ca.Function:
     x, p, drive = form.symbols()
     lower = ca.Sparsity.lower(form.nx)  # a covariance is carried by its lower triangle alone
     P = ca.tril2symm(ca.SX.sym("P", lower))
@@ -40,9 +54,15 @@ def _kalman(form: Form) -> ca.Function:
         density[form.structure.states.index(state)] = level
     Q = ca.diag(density) * drive[3]
     P_next = Ax @ (P_updated + Q / 2) @ Ax.T + Q / 2
+    per_step = ca.vertcat(drive, measured, present)
+    if may_stray:
+        deviation = ca.SX.sym("deviation")
+        by_plane = ca.Function("by_plane", [before, p, drive], [ca.jacobian(after, drive[0])])
+        moved = by_plane(updated, p, drive) * deviation
+        P_next += moved @ moved.T
+        per_step = ca.vertcat(per_step, deviation)
     carried = ca.vertcat(x, _of_lower(P, lower))
     carried_next = ca.vertcat(x_next, _of_lower(P_next, lower))
-    per_step = ca.vertcat(drive, measured, present)
     result = ca.vertcat(error, S[0, 0], S[0, 1], S[1, 1], ca.vec(K), x)
     carried_next, result = ca.cse([carried_next, result])
     return ca.Function("kalman", [carried, per_step, ca.vertcat(p, noise)], [carried_next, result])
@@ -89,9 +109,10 @@ def kalman_pass(
     lower = np.tri(form.nx, dtype=bool).T  # column by column, as CasADi keeps it
     P = np.diag(spread if spread is not None else np.zeros(form.nx))
     carried = np.concatenate([start, P[lower]])
-    per_step = np.vstack([inputs.drive, inputs.measured, inputs.present])
+    may_stray = inputs.astray.size > 0
+    per_step = np.vstack([inputs.drive, inputs.measured, inputs.present, *[inputs.astray] * may_stray])
     levels = np.concatenate([inputs.widened(parameters), noise])
-    table = over_rows(_kalman, form, rows)(carried, per_step, levels)
+    table = over_rows(_kalman_astray if may_stray else _kalman, form, rows)(carried, per_step, levels)
     split = 5 + 2 * form.nx
     variance = table[2:5]
     variance[::2][inputs.present == 0.0] = 1.0

@@ -20,6 +20,10 @@ from host.recordings.recording import Array, Recording
 
 NOTE = "the plane is taken to move evenly from row to row: the recording follows that better than angles held"
 
+NOTE_ASTRAY = (
+    "the plane moved more often than it was recorded: its mean angle in a row is off by {:.2g} of how far it"
+    " moved there, which counts as noise; record it as often as it is steered"
+)
 NOTE_BETWEEN = "the plane was not read in every row: it is taken to move on from reading to reading"
 
 
@@ -35,8 +39,17 @@ def with_moving_plane(recording: Recording) -> Recording:
     beside = np.maximum(np.abs(slopes[:-2]), np.abs(slopes[2:]))
     slope = np.zeros_like(recording.rudder)
     slope[1:-2] = np.clip(slopes[1:-1], -2.0 * beside, 2.0 * beside)
-    rudder = recording.rudder + 0.5 * recording.intervals * slope
-    return replace(recording, rudder=rudder, has_moving_plane=True, notes=(*recording.notes, NOTE))
+    moved = recording.intervals * slope
+    rudder, notes = recording.rudder + 0.5 * moved, (*recording.notes, NOTE)
+    return replace(recording, rudder=rudder, plane_moved=moved, has_moving_plane=True, notes=notes)
+
+
+def with_plane_astray(recording: Recording, share: float) -> Recording:
+    """The same where the mean angle of a plane that moved on is known but for this share of what it moved.
+
+    As of an autopilot that steers it more often than it is recorded.
+    """
+    return replace(recording, plane_astray=share, notes=(*recording.notes, NOTE_ASTRAY.format(share)))
 
 
 def between_readings(

@@ -34,6 +34,8 @@ class Recording:
     plane       its readings, where these are further apart than the rows
     plane_doubt  rad and m (J, 2, N): what pitch and depth do where one of J moments at which the plane
                 stepped between its readings is off by a deviation; None where all of them are known
+    plane_moved  rad (N,): how far the plane moved on in each row; None where it held its angles
+    plane_astray  deviation of its mean angle in a row from `rudder`, over how far it moved on in that
     counts      what was refused in the whole file, by cause
     notes       what was lost or decided on the user's behalf, one sentence each
     alarms      s, on the axis of time: when the vehicle was found to move no longer as it did
@@ -54,6 +56,8 @@ class Recording:
     has_moving_plane: bool = False
     plane: PlaneReadings | None = None
     plane_doubt: Array | None = None
+    plane_moved: Array | None = None
+    plane_astray: float = 0.0
     counts: Counter[str] = field(default_factory=Counter)
     notes: tuple[str, ...] = ()
     alarms: tuple[float, ...] = ()
@@ -85,6 +89,7 @@ class Recording:
             speed=self.speed[rows],
             pitch_rate=self.pitch_rate[rows],
             plane_doubt=None if self.plane_doubt is None else self.plane_doubt[:, :, rows],
+            plane_moved=None if self.plane_moved is None else self.plane_moved[rows],
             alarms=tuple(alarm for alarm in self.alarms if start <= alarm < end),
             before=self._led_in(rows),
         )

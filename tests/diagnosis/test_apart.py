@@ -10,7 +10,7 @@ from hidden_dive import Extra, hidden_dive, nothing
 
 from host.catalogue import structure_of
 from host.diagnosis import plane_choice
-from host.diagnosis.diagnose import _apart, _with_apart
+from host.diagnosis.diagnose import _apart, _on_all
 from host.diagnosis.plane_choice import Way, likelier_first
 from host.diagnosis.search import apart
 from host.diagnosis.search import short_runs as pieces
@@ -200,7 +200,8 @@ def test_what_is_apart_is_left_out_and_told(monkeypatch: pytest.MonkeyPatch) -> 
     assert rest[0][0].notes == ("other physics acts, and left out: 100 to 140 s",)
     assert "From 100 to 140 s other physics acts" in _apart(way)
     assert _apart(Way([dive], cast("Any", fitter))) == ""
-    assert _with_apart("explained", way) == "partly_explained"
-    assert _with_apart("no_mismatch", way) == "partly_explained"
-    assert _with_apart("unexplained", way) == "unexplained"
-    assert _with_apart("explained", Way([dive], cast("Any", fitter))) == "explained"
+    assert _on_all("explained", way) == "partly_explained"
+    assert _on_all("no_mismatch", way) == "partly_explained"
+    assert _on_all("explained", way._replace(apart=(), is_astray=True)) == "partly_explained"
+    assert _on_all("unexplained", way) == "unexplained"
+    assert _on_all("explained", Way([dive], cast("Any", fitter))) == "explained"

@@ -67,6 +67,19 @@ def test_kalman_filter_without_process_noise_is_the_free_run() -> None:
     assert np.allclose(run.gains, 0.0)
 
 
+def test_a_plane_that_may_be_off_in_a_row_spreads_what_comes_after_it() -> None:
+    recording, states = fly(Dive(duration=1.0))
+    inputs, start = inputs_of(recording), np.append(states[:, 0], 0.0)
+    noise, off = np.array([3e-6, 1e-4, 0.0, 0.0]), np.zeros(recording.time.size)
+    off[3] = 0.02
+    variance = kalman_pass(TRUTH, start, noise, replace(inputs, astray=off)).variance
+    runs = (free_run(TRUTH, start, inputs.with_rudder(rudder)).outputs for rudder in (off, 0.0 * off))
+    shift = np.subtract(*runs)[:, 4]  # linear: whatever else the plane does
+    assert np.allclose(variance[:, :4], [[noise[0]], [0.0], [noise[1]]], rtol=1e-12)
+    spread = np.outer(shift, shift) + np.diag(noise[:2])
+    assert np.allclose(variance[:, 4], [spread[0, 0], spread[0, 1], spread[1, 1]], rtol=1e-9)
+
+
 def test_kalman_likelihood_equals_the_dense_gaussian() -> None:
     """The filter's product of innovations must be the joint density of all measurements."""
     recording, states = fly(Dive(duration=1.2, force_density=(0.02, 0.05)))

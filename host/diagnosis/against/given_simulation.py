@@ -153,6 +153,7 @@ def _seen(recording: Recording, one: Recording, floor: Array, rng: np.random.Gen
         has_moving_plane=False,
         plane=None,
         plane_doubt=None,
+        plane_moved=None,
         notes=(),
         speed=speed,
         pitch_rate=np.full(recording.time.size, np.nan),

@@ -17,8 +17,9 @@ from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.leftover import Leftover, leftover
 from host.diagnosis.fits.margins import NAMING_MARGIN, margin
 from host.diagnosis.fits.prospects import form_gains
-from host.diagnosis.fits.sea_fits import again_in_waves, with_sea
+from host.diagnosis.fits.sea_fits import again_in_waves, as_filtered, with_sea
 from host.diagnosis.fits.workers import Workers
+from host.diagnosis.search.outset import FAIR_PART
 from host.diagnosis.search.search import Search
 from host.diagnosis.search.whole_vehicle import is_real
 
@@ -69,14 +70,33 @@ def pushed_about(calm: Search, pushed: Explanation, are_far_likelier: bool) -> E
     Of forces that leave nothing it must be asked whether they are any, unless they are far likelier than
     none; where a form of unknown physics gains beside these, they stand for physics in part.
     """
-    fitter = calm.fitter
-    calm.on_progress("random forces")
-    base, root = with_sea(fitter, calm.base), with_sea(fitter, calm.root)
-    search = Search(fitter, calm.workers, calm.on_progress, base, root)
+    search = _under_forces(calm)
     found = search.run_from(pushed, is_all=True)
-    left = leftover(fitter, found)
+    left = leftover(calm.fitter, found)
     if not is_real(found.names) or (left.is_nothing and not are_far_likelier):
         return None
-    if left.is_nothing and max(form_gains(fitter, found).values()) > margin(found):
-        left = replace(left, is_smooth=True)
+    return Explained(found, search, _unless_a_form_gains(calm.fitter, found, left), None, is_of_all=True)
+
+
+def among_forces(calm: Search, pushed: Explanation, without: Explanation) -> Explained:
+    """The same, and what else gains a fair part of what the forces do.
+
+    without  all that every vehicle has, without forces
+    """
+    search = _under_forces(calm)
+    least = FAIR_PART * (as_filtered(calm.fitter, without).bic - pushed.bic)
+    found = search.run_from(pushed, is_all=max(search.gains(pushed).values()) < least)
+    left = _unless_a_form_gains(calm.fitter, found, leftover(calm.fitter, found))
     return Explained(found, search, left, None, is_of_all=True)
+
+
+def _under_forces(calm: Search) -> Search:
+    calm.on_progress("random forces")
+    base, root = with_sea(calm.fitter, calm.base), with_sea(calm.fitter, calm.root)
+    return Search(calm.fitter, calm.workers, calm.on_progress, base, root)
+
+
+def _unless_a_form_gains(fitter: Fitter, found: Explanation, left: Leftover) -> Leftover:
+    """What is left, or what a form of unknown physics gains where that is nothing."""
+    gains_more = left.is_nothing and max(form_gains(fitter, found).values()) > margin(found)
+    return replace(left, is_smooth=True) if gains_more else left

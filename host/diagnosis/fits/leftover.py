@@ -40,6 +40,8 @@ class Leftover:
     smooth_gain     twice the log-likelihood that any smooth force of the motion would gain, correlation
                     discounted
     is_smooth       whether that is more than chance gives
+    is_by_plane     the random forces of the fit stand beside a plane that moved more often than it was
+                    recorded: they are what it did in part
     """
 
     is_coloured: bool
@@ -49,6 +51,12 @@ class Leftover:
     is_above_floor: bool
     smooth_gain: float
     is_smooth: bool
+    is_by_plane: bool = False
+
+    @property
+    def is_of_what_drives(self) -> bool:
+        """Whether a free run is led astray by what is known too little of plane or speed, and by no sea."""
+        return self.is_by_speed or self.is_by_plane
 
     @property
     def is_nothing(self) -> bool:
@@ -71,17 +79,19 @@ def leftover(fitter: Fitter, best: Explanation) -> Leftover:
     smooth_gain = ahead / correlation_factor(fit.whitened)
     by_chance = chi2.isf(SIGNIFICANCE, len(ANY_SMOOTH_FORCE.parameters))
     is_by_speed = are_by_speed(fitter, fit)
-    slack = COLOUR if fit.waves.any() or is_by_speed else 0.0
+    is_by_plane = fit.has_process_noise and any(one.plane_astray > 0.0 for one in fitter.recordings)
+    slack = COLOUR if fit.waves.any() or is_by_speed or is_by_plane else 0.0
     doubt = SEA_DOUBT if fit.has_process_noise or fit.has_coloured_noise else 1.0
     is_sea = fit.waves.any() or _heave_by_sea(fit) >= LEAST_SEA
     return Leftover(
         is_coloured=not all(is_white(e, 20, SIGNIFICANCE, slack) and is_even(e, slack) for e in innovations),
         is_local=_is_local(fitter.recordings, even),
         is_by_speed=is_by_speed,
-        is_no_sea=bool(fit.has_process_noise and not is_sea and not is_by_speed),
+        is_no_sea=bool(fit.has_process_noise and not (is_sea or is_by_speed or is_by_plane)),
         is_above_floor=is_above_floor(fitter, fit),
         smooth_gain=smooth_gain,
         is_smooth=bool(smooth_gain > by_chance * doubt),
+        is_by_plane=is_by_plane,
     )
 
 

@@ -36,6 +36,10 @@ BY_SPEED = (
     " The errors of the measured speed lead a free run away from the recording, as small random forces "
     "would, most of all that of a hull which is unstable by itself; as such they are part of the noise model."
 )
+BY_PLANE = (
+    " What the plane did between the rows, where it moved more often than it was recorded, leads a free run "
+    "away from the recording, as random forces would; as such it is part of the noise model."
+)
 DRIFT = (
     ("pitch is off by {:.2g} deg", 180.0 / pi),
     ("depth is off by {:.2g} cm", 100.0),
@@ -198,7 +202,7 @@ def _doubt(explanation: Explanation, left: Leftover, waves: float) -> str:
     """Why a set that leaves nothing may yet be none that acts; empty where nothing speaks against it."""
     if waves < FAINT_WAVES:
         return "waves are hardly likelier than physics that the catalogue does not hold."
-    if not left.is_by_speed and is_pushed_but_not_turned(explanation):
+    if not left.is_of_what_drives and is_pushed_but_not_turned(explanation):
         return (
             "the random forces push the hull and do not turn it, as moving water would with that Munk "
             "moment: they may stand for physics that the catalogue does not hold."
@@ -235,14 +239,15 @@ def _trace(best: Explanation, left: Leftover) -> str:
 
 
 def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfit, waves: float) -> str:
-    sea = (BY_SPEED if left.is_by_speed else BY_SEA) * best.fit.has_process_noise + _drift(best.fit.wander)
+    forces = BY_PLANE if left.is_by_plane else BY_SPEED if left.is_by_speed else BY_SEA
+    sea = forces * best.fit.has_process_noise + _drift(best.fit.wander)
     if verdict == "no_mismatch":
         return "Nothing is missing from the base model on this recording." + sea
     forms = "".join(f" {sentence}" for sentence in unknown_in(best))
     worst = "depth" if after.chi2_depth > after.chi2_pitch else "pitch"
     size = max(after.chi2_depth, after.chi2_pitch) ** 0.5
     if verdict == "explained" and sea:
-        is_astray = best.fit.has_process_noise and not left.is_by_speed and after.chi2 > WORSE
+        is_astray = best.fit.has_process_noise and not left.is_of_what_drives and after.chi2 > WORSE
         astray = (
             f" They lead a free run over what was held out astray, {worst} by {size:.1f} times its noise."
         )
@@ -275,7 +280,7 @@ def _remaining(verdict: Verdict, best: Explanation, left: Leftover, after: Misfi
         kind = "it is as rough as sensor noise, but larger than these sensors show elsewhere"
     is_part = verdict == "partly_explained"
     begin = "Most is explained, but" if is_part else "None of the physics in the catalogue explains this:"
-    run = "a few seconds ahead" if left.is_by_speed or left.is_no_sea else "in a free run"
+    run = "a few seconds ahead" if left.is_of_what_drives or left.is_no_sea else "in a free run"
     off = (
         f"{size:.1f} times its sensor noise"
         if size >= MORE_THAN_NOISE
