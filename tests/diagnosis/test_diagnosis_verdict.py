@@ -172,9 +172,12 @@ def test_a_zero_error_of_pitch_that_a_current_and_a_moment_undo_is_doubted(
     assert verdict_on(best, leftover(), misfit(5.0), misfit(1.0)) == verdict
 
 
-@pytest.mark.parametrize(("share", "is_doubted"), [(0.95, True), (-0.95, False), (0.5, False)])
-def test_a_current_that_cancels_a_weight_beside_a_drag_is_doubted(
-    base: Explanation, share: float, is_doubted: bool
+@pytest.mark.parametrize(
+    ("share", "is_doubted", "is_alone"),
+    [(0.99, True, True), (0.9, True, False), (-0.99, False, False), (0.5, False, False)],
+)
+def test_a_current_that_cancels_a_weight_is_doubted_sooner_beside_a_drag(
+    base: Explanation, share: float, is_doubted: bool, is_alone: bool
 ) -> None:
     names = frozenset({"heave_quadratic_drag", "net_buoyancy", "vertical_current"})
     known = values_of(base)
@@ -183,7 +186,8 @@ def test_a_current_that_cancels_a_weight_beside_a_drag_is_doubted(
     assert bool(cancelling_in(best)) == is_doubted
     verdict = verdict_on(best, leftover(), misfit(5.0), misfit(1.0))
     assert verdict == ("partly_explained" if is_doubted else "explained")
-    assert not cancelling_in(replace(best, names=names - {"heave_quadratic_drag"}))
+    alone = cancelling_in(replace(best, names=names - {"heave_quadratic_drag"}))
+    assert alone == (["net_buoyancy", "vertical_current"] if is_alone else [])
 
 
 @pytest.mark.parametrize(

@@ -98,16 +98,16 @@ def cancelling_in(explanation: Explanation) -> list[str]:
     """A zero error of the plane, a weight and a moment, where the first all but undoes the others.
 
     Or a zero error of pitch that a current all but undoes in how the vehicle rises, and a moment or the
-    plane's zero error in what rights it. Or a drag, a weight and a current that all but undoes it: together
-    they are a drag to one side only.
+    plane's zero error in what rights it. Or a weight and a current that all but undoes it, or nearly so
+    beside a drag: together they are a drag to one side only.
     """
     fit = explanation.fit
     p = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
-    one_sided = ["heave_quadratic_drag", "net_buoyancy", "vertical_current"]
-    if explanation.names.issuperset(one_sided):
-        weight, current = p["c_w0"], -p["a1"] * p["current"]
-        if _cancel(max(weight, current, key=abs), min(weight, current, key=abs), NEARLY_CANCELLED):
-            return one_sided
+    if explanation.names.issuperset(["net_buoyancy", "vertical_current"]):
+        drag = [name for name in ("heave_quadratic_drag",) if name in explanation.names]
+        larger, smaller = sorted((p["c_w0"], -p["a1"] * p["current"]), key=abs, reverse=True)
+        if _cancel(larger, smaller, NEARLY_CANCELLED if drag else CANCELLED):
+            return [*drag, "net_buoyancy", "vertical_current"]
     offsets = ["net_buoyancy", "rudder_offset", "trim_moment"]
     if explanation.names.issuperset(offsets):
         force, moment = p["b1"] * p["rudder_zero"], p["b2"] * p["rudder_zero"]
