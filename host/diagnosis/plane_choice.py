@@ -96,7 +96,7 @@ def likelier_first(
         return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
     one = None
     if may_leave_out and whole is not None and leading.fitter.excess(whole.fit) > MUCH:
-        one = one_that_says_all(leading.fitter, whole, jobs)
+        one = one_that_says_all(leading.fitter, jobs)
         if one is None:
             told, whole = _in_short_runs([leading, *others], whole, on_progress, jobs)
             if told:

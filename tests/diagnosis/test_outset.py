@@ -210,12 +210,25 @@ def test_one_effect_that_leaves_nothing_is_found_before_stretches_are_left_out(
     monkeypatch.setattr(real, "at_first", {})
     monkeypatch.setattr(real, "excess", lambda _: left)
     monkeypatch.setattr(Explanation, "leaves_white", is_white)
-    found = outset.one_that_says_all(real, real.root, 1)
+    found = outset.one_that_says_all(real, 1)
     assert (found is not None and leads in found.names) == says_all
     monkeypatch.setattr(outset, "all_beside", lambda _, one: one)
     monkeypatch.setattr(outset, "_by_fewer", lambda *a: a[2])
     outset._beside_what_leads(real, real.root, (*DRIVE, *IN_TIME), 1)
-    assert asked == [*DRIVE, *IN_TIME]  # each fitted once
+    assert asked == [*SCANS, *DRIVE, *IN_TIME]  # each fitted once
+
+
+@pytest.mark.parametrize(("damping", "is_enough"), [(-0.5, True), (-0.015, False), (-20.0, False)])
+def test_no_hull_that_hardly_heaves_is_enough_beside_forces(
+    damping: float, is_enough: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    point = SimpleNamespace(parameters=np.array([damping, -1.0, -1.0, 0.4, -1.0, 2.0]))
+    sea: Any = SimpleNamespace(bic=-100.0, fit=SimpleNamespace(end=point, samples=100))
+    monkeypatch.setattr(outset, "as_filtered", lambda *_: SimpleNamespace(bic=0.0))
+    monkeypatch.setattr(outset, "margin", lambda _: 6.0)
+    monkeypatch.setattr(outset, "form_gains", lambda *_: {"unknown_force_w_w": 1.0})
+    search: Any = SimpleNamespace(fitter=None, gains=lambda _: {"rudder_stall": 1.0})
+    assert outset.is_enough_beside(search, sea, sea) == is_enough
 
 
 @pytest.mark.parametrize(("left", "asked"), [(MUCH - 0.1, []), (MUCH + 0.1, [(*DRIVE, *IN_TIME)])])

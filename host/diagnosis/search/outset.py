@@ -87,9 +87,9 @@ def beside_what_leads(fitter: Fitter, best: Explanation, jobs: int = 1) -> Expla
     return min([best, *led, *_joined_by(fitter, best, layers, jobs)], key=lambda e: e.bic)
 
 
-def one_that_says_all(fitter: Fitter, whole: Explanation, jobs: int) -> Explanation | None:
+def one_that_says_all(fitter: Fitter, jobs: int) -> Explanation | None:
     """The likeliest of what may lead, alone, if it leaves nothing: no turn is explained so, but by a form."""
-    alone = _each_alone(fitter, _what_may_lead(fitter, whole), jobs)
+    alone = _each_alone(fitter, (*SCANS, *DRIVE, *IN_TIME), jobs)
     best = min(alone, key=lambda e: e.bic)
     return best if says_all(fitter, best) and best.names.isdisjoint(UNKNOWN) else None
 
@@ -220,9 +220,13 @@ def pushed_by_forces(search: "Search", whole: Explanation) -> Explanation | None
 def is_enough_beside(search: "Search", sea: Explanation, whole: Explanation) -> bool:
     """Whether beside random forces nothing in the catalogue gains, nor any form of unknown physics.
 
+    Not of a hull that hardly heaves, which these forces carry in its place.
+
     whole  without forces: of what these explain more than it does, what gains must gain a fair part
     """
     fitter = search.fitter
+    if not has_usual_heave(sea.fit.end):
+        return False
     explained = as_filtered(fitter, whole).bic - sea.bic
     least = max(margin(sea) + log(sea.fit.samples), FAIR_PART * explained)
     return max(*search.gains(sea).values(), *form_gains(fitter, sea).values()) < least
