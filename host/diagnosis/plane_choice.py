@@ -206,11 +206,12 @@ def _astray(found: list[Way], whole: Explanation, on_progress: Callable[[str], N
     if not moving or found[0].fitter.excess(whole.fit) < MUCH:
         return []
     on_progress("a plane that moved more often than it was recorded")
-    fitter, calm = moving[0].fitter, whole if moving[0] is found[0] else _taken_so(moving[0].fitter, whole)
+    fitter = moving[0].fitter
+    if not (share := astray_share(fitter)):
+        return []
+    calm = whole if moving[0] is found[0] else _taken_so(fitter, whole)
     sea = with_sea(fitter, calm)
     if as_filtered(fitter, calm).bic < sea.bic + FORCED * sea.fit.samples:
-        return []
-    if not (share := astray_share(fitter)):
         return []
     recordings = [with_plane_astray(one, share) for one in moving[0].recordings]
     fitter = Fitter(excerpt(divide(recordings).teaching))
