@@ -85,7 +85,7 @@ def likelier_first(
     That is all that every vehicle has, where nothing is left beside it; else plain waves, where there are
     any, with all that where it is likelier; else all that every vehicle has, where random forces account for
     what is left, or next to nothing is; else single effects. Where these forces explain far more without
-    accounting for it all, they tell which way.
+    accounting for it all, they tell which way. A plane that moved more often than its rows show leaves one.
 
     may_leave_out  whether stretches may be left out without which nothing is left beside it
     """
