@@ -17,6 +17,7 @@ from host.diagnosis.recordings.spans import divide, excerpt
 from host.diagnosis.search.apart import BENT, stretches_apart
 from host.diagnosis.search.led_by_filter import led_by_a_filter
 from host.diagnosis.search.outset import (
+    LOST,
     at_the_outset,
     beside_what_leads,
     leads_on,
@@ -25,6 +26,7 @@ from host.diagnosis.search.outset import (
     says_all,
 )
 from host.diagnosis.search.search import Search
+from host.diagnosis.search.several_speeds import at_several_speeds
 from host.diagnosis.search.short_runs import followed_shortly, short_runs
 from host.diagnosis.search.whole_vehicle import is_real, with_all_ordinary
 from host.likelihood.valleys import look_alikes
@@ -95,12 +97,12 @@ def likelier_first(
     if whole is not None and says_all(leading.fitter, whole):
         return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
     one = None
-    if may_leave_out and whole is not None and leading.fitter.excess(whole.fit) > MUCH:
+    if whole is not None and leading.fitter.excess(whole.fit) > MUCH:
         one = one_that_says_all(leading.fitter, jobs)
-        if one is None:
-            told, whole = _in_short_runs([leading, *others], whole, on_progress, jobs)
-            if told:
-                return told
+    if whole is not None and one is None:
+        told, whole = _beside_no_single_one([leading, *others], whole, on_progress, jobs, may_leave_out)
+        if told:
+            return told
     if whole is not None:
         whole = one or beside_what_leads(leading.fitter, whole, jobs)
     if seen := _among_waves(found):
@@ -127,6 +129,20 @@ def likelier_first(
         leads = True
     pushed = [] if whole is None else _pushed_about(begun, whole, on_progress, jobs)
     return pushed or (begun if leads else by_single_effects(found, on_progress, jobs))
+
+
+def _beside_no_single_one(
+    found: list[Way], whole: Explanation, on_progress: Callable[[str], None], jobs: int, may_leave_out: bool
+) -> tuple[list[Way], Explanation]:
+    """The ways at several speeds, or as short runs tell them, none where neither does; and the whole."""
+    fitter = found[0].fitter
+    if fitter.excess(whole.fit) > LOST:
+        whole = at_several_speeds(fitter, whole)
+    if says_all(fitter, whole):
+        return [way._replace(outset=own) for way, own in _as_seen_by(found, whole)], whole
+    if not may_leave_out or fitter.excess(whole.fit) < MUCH:
+        return [], whole
+    return _in_short_runs(found, whole, on_progress, jobs)
 
 
 def _in_short_runs(

@@ -37,6 +37,7 @@ USUAL_SPEED, SPEED_FACTOR = 1.5, 3.0  # m/s; gliders make 0.3, torpedoes 10
 USUAL_DAMPING, DAMPING_FACTOR = -1.0, 5.0  # 1/s, of a1; gliders 0.1, small quick hulls 6
 # 1/s, of a1: a model that lacks an effect may follow its plane at once, or hardly at all.
 INSTANT, IDLE = -10.0, -0.1
+UNDAMPED = -1e-3  # 1/s, of a2
 STANDING = 0.1  # m/s: no plane works at less
 A1, A2, A3, B1, B2, U0 = (NAMES.index(name) for name in ("a1", "a2", "a3", "b1", "b2", "u0"))
 LAGS, DEPTH_LAG, MUNK, COUPLING = ("lag_time", "pitch_lag_time"), "depth_lag_time", "c_qw", "c_wq"
@@ -209,6 +210,11 @@ def _with_heave_swapped(point: Point) -> list[Point]:
 def has_usual_heave(point: Point) -> bool:
     """Whether heave neither follows the plane at once nor hardly moves, and does not do the speed's work."""
     return bool(INSTANT < point.parameters[A1] < IDLE and point.parameters[U0] > STANDING)
+
+
+def has_damped_pitch(point: Point) -> bool:
+    """Whether the hull damps its own pitching, as water does: else something else does that, or undoes it."""
+    return bool(point.parameters[A2] < UNDAMPED)
 
 
 def with_usual_heave(start: Point) -> list[Point]:

@@ -21,6 +21,7 @@ from host.diagnosis.proof.verdict import (
     cancelling_in,
     rare_in,
     remaining,
+    undamped_in,
     verdict_on,
 )
 
@@ -213,6 +214,27 @@ def test_what_no_hull_makes_of_its_water_is_doubted(
     assert ("larger than on any hull" in said) == is_doubted
     beside = verdict_on(best, leftover(is_smooth=True), misfit(5.0), misfit(1.0))
     assert beside == ("unexplained" if is_doubted else "partly_explained")
+
+
+@pytest.mark.parametrize(
+    ("own", "value", "std", "doubted"),
+    [
+        ("a2", -1e-4, 0.01, "pitch damping"),
+        ("a1", -1e-4, 0.01, "heave damping"),
+        ("a2", -1e-4, 0.5, ""),
+        ("a2", -0.01, 0.01, ""),
+    ],
+)
+def test_a_hull_that_does_not_damp_is_doubted(
+    base: Explanation, own: str, value: float, std: float, doubted: str
+) -> None:
+    fit = base.lean().fit
+    k = fit.structure.names.index(own)
+    values, information = fit.parameters.copy(), np.eye(fit.parameters.size)
+    values[k], information[k, k] = value, std**-2
+    names = frozenset({"munk_moment"})
+    best = Explanation(names, replace(fit, parameters=values, information=information), base.bic)
+    assert undamped_in(best) == [doubted.replace(" ", "_")] * bool(doubted)
 
 
 @pytest.mark.parametrize(("speed", "is_doubted"), [(2.0, False), (4.0, False), (9.0, True)])

@@ -10,6 +10,7 @@ from host.catalogue import ORDINARY
 from host.diagnosis import plane_choice
 from host.diagnosis.fits.margins import MUCH
 from host.diagnosis.plane_choice import Way, likelier_first
+from host.diagnosis.search.outset import LOST
 
 MANY = frozenset({*ORDINARY})
 
@@ -80,10 +81,11 @@ def test_no_stretch_is_left_out_of_what_one_effect_explains(monkeypatch: pytest.
     fitter: Any = SimpleNamespace(
         root=SimpleNamespace(bic=0.0), excess=lambda fit: fit, polished=lambda one: one
     )
-    whole: Any = SimpleNamespace(bic=0.0, fit=2.0 * MUCH, names=MANY, leaves_white=False)
+    whole: Any = SimpleNamespace(bic=0.0, fit=2.0 * LOST, names=MANY, leaves_white=False)
     stall: Any = SimpleNamespace(bic=-9.0, fit=0.1, names={"rudder_stall"}, leaves_white=True)
     monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: whole)
     monkeypatch.setattr(plane_choice, "one_that_says_all", lambda *_: stall)
+    monkeypatch.setattr(plane_choice, "at_several_speeds", lambda *_: pytest.fail("it is explained"))
     monkeypatch.setattr(plane_choice, "_in_short_runs", lambda *_: pytest.fail("it is explained"))
     monkeypatch.setattr(plane_choice, "beside_what_leads", lambda *_: pytest.fail("it leads"))
     monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)
@@ -92,3 +94,19 @@ def test_no_stretch_is_left_out_of_what_one_effect_explains(monkeypatch: pytest.
     monkeypatch.setattr(plane_choice, "_pushed_about", lambda *_: [])
     (way,) = likelier_first([Way([], fitter)], lambda _: None, 1, may_leave_out=True)
     assert way.outset is stall
+
+
+@pytest.mark.parametrize("left", [0.5 * LOST, 2.0 * LOST])
+def test_several_speeds_are_asked_for_where_no_single_change_is_all_and_more_is_left_than_a_hull_does(
+    monkeypatch: pytest.MonkeyPatch, left: float
+) -> None:
+    whole: Any = SimpleNamespace(bic=0.0, fit=left, names=MANY, leaves_white=False)
+    told: Any = SimpleNamespace(bic=-9.0, fit=0.1, names=MANY, leaves_white=True)
+    short = [Way([], cast("Any", None))]
+    monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: whole)
+    monkeypatch.setattr(plane_choice, "one_that_says_all", lambda *_: None)
+    monkeypatch.setattr(plane_choice, "at_several_speeds", lambda *_: told)
+    monkeypatch.setattr(plane_choice, "_in_short_runs", lambda _, whole, *__: (short, whole))
+    fitter: Any = SimpleNamespace(root=SimpleNamespace(bic=0.0), excess=lambda fit: fit)
+    found = likelier_first([Way([], fitter)], lambda _: None, 1, may_leave_out=True)
+    assert [way.outset for way in found] == [told if left > LOST else None]

@@ -376,3 +376,17 @@ def test_what_wanders_ends_no_search_before_a_dozen_were_tried(
     beam.beam_search(search)
     assert done == asked
     assert foreign.names in search.tried
+
+
+def test_of_two_that_come_late_the_one_does_not_hide_the_other() -> None:
+    names = frozenset({"actuator_delay", "pitch_sensor_lag"})
+    fitter = Fitter([flown({"delay": 0.9, "pitch_lag_time": 0.33}, names)])
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        singles = sorted(map(search.remember, search.singles()), key=lambda e: e.bic)
+        assert singles[0].names & {"actuator_delay", "pitch_sensor_lag"}
+        pair, *_ = _with_best_pair(search, singles[:1])
+    values = dict(zip(pair.fit.structure.names, pair.fit.parameters, strict=True))
+    assert names < pair.names
+    assert values["delay"] == pytest.approx(0.9, abs=0.05)
+    assert values["pitch_lag_time"] == pytest.approx(0.33, abs=0.05)

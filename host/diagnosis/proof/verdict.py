@@ -56,6 +56,9 @@ CERTAIN = 3.0  # deviations of a Munk moment
 HARDLY_TURNED = 0.01  # of the density of the moment that moving water has beside its force
 STEEPEST, NO_SEA = 0.44, 2.0  # slope of a breaking wave; times that, so that no estimate is off so far
 NEARLY = 1.0 - 1e-6  # of a bound: at it
+DAMPINGS = {"a1": "heave_damping", "a2": "pitch_damping"}
+UNDAMPED = PARAMETERS[NAMES.index("a1")].upper * (2.0 - NEARLY)  # 1/s: at its bound, but for rounding
+SLIGHT_DAMPING = 0.02  # 1/s: an estimate as sure as that tells none from that of a slow hull
 KNOWN = 1.0 / 3.0  # of it, is what a deviation may be there, if to end at a bound is to tell anything
 
 
@@ -150,6 +153,18 @@ def beyond_bounds_in(explanation: Explanation) -> list[str]:
     return sorted({*found})
 
 
+def undamped_in(explanation: Explanation) -> list[str]:
+    """The dampings of a hull that end at none, where they are known: something else does their work."""
+    fit = explanation.fit
+    std = np.sqrt(np.diag(safe_inverse(fit.information)))
+    found = []
+    for name, damping in DAMPINGS.items():
+        k = NAMES.index(name)
+        if fit.free[k] and fit.parameters[k] > UNDAMPED and std[k] < SLIGHT_DAMPING:
+            found.append(damping)
+    return found
+
+
 def beyond_geometry_in(explanation: Explanation) -> list[str]:
     """A coupling of pitch rate into heave, or a Munk moment, beyond what any hull makes of its water.
 
@@ -212,6 +227,7 @@ def _doubt(explanation: Explanation, left: Leftover, waves: float) -> str:
         (rare if len(rare) > MOST_RARE else [], "seldom act at once: together"),
         (cancelling_in(explanation), "cancel: together"),
         (beyond_bounds_in(explanation), "would have to be larger than on any vehicle:"),
+        (undamped_in(explanation), "would have to be next to nothing, as it is on no hull:"),
         (beyond_geometry_in(explanation), "would have to be larger than on any hull:"),
         (breaking_in(explanation), "would have broken:"),
     )

@@ -25,6 +25,7 @@ BEAM = 4  # single effects carried on
 FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
 NARROW = 2  # of larger sets, which cost most and of which there are most
 PROMISING = 6
+LATE = ("actuator_delay", "actuator_lag", "pitch_sensor_lag", "depth_sensor_lag")
 FAR_LESS = 0.5  # of what a dozen effects leave: two that come so near are the way to go on
 
 
@@ -97,11 +98,18 @@ def _is_explained_otherwise(search: "Search", joint: Explanation) -> bool:
 def _with_best_pair(search: "Search", singles: list[Explanation]) -> list[Explanation]:
     """The sets led by the likeliest pair of the first and another of them, if that leaves less than much.
 
-    Two that each explain much may be all that acts: then a dozen need not join.
+    Two that each explain much may be all that acts: then a dozen need not join. Of two that both come late
+    the one has done the other's work as well, up to its bound, and left little to tell of it: so those pair
+    with each other, and are begun from both.
     """
     first, *others = singles
     names = [name for one in others for name in one.names - first.names]
-    pairs = [search.remember(e) for e in search.workers.results([search.growth(first, n) for n in names])]
+    own = [name for name in LATE if name in first.names]
+    late = [name for name in LATE if name not in first.names] if own else []
+    tasks = [search.growth(first, name) for name in dict.fromkeys([*names, *late])]
+    alone = [search.tried.get(search.root.names | {name}) for name in late]
+    tasks += [search.growth(one, name) for one in alone if one is not None for name in own]
+    pairs = [search.remember(e) for e in search.workers.results(tasks)]
     best = min(pairs, key=lambda e: e.bic, default=first)
     return [best, *singles] if search.fitter.excess(best.fit) < MUCH else singles
 

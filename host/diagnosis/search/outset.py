@@ -30,12 +30,11 @@ from host.diagnosis.fits.workers import Workers
 from host.diagnosis.recordings.spans import led_excerpt
 from host.diagnosis.search.lone_form import likely_forms
 from host.diagnosis.search.pruning import pruned
-from host.diagnosis.search.several_speeds import at_several_speeds
 from host.diagnosis.search.together import with_more
 from host.diagnosis.search.whole_vehicle import all_beside, ended, is_real
 from host.likelihood.fit import Fit
 from host.likelihood.gauss_newton import Point
-from host.likelihood.valleys import A1, A2, has_usual_heave, look_alikes
+from host.likelihood.valleys import A1, A2, has_damped_pitch, has_usual_heave, look_alikes
 
 if TYPE_CHECKING:
     from host.diagnosis.search.search import Search
@@ -54,10 +53,7 @@ IN_TIME = ("surface_waves", "internal_wave", "unknown_swinging_moment", *sorted(
 
 
 def at_the_outset(fitter: Fitter) -> Explanation | None:
-    """The root with all that every vehicle has, where the root leaves much; None where it does not.
-
-    And at several speeds, where that leaves far less.
-    """
+    """The root with all that every vehicle has, where the root leaves much; None where it does not."""
     if fitter.excess(fitter.root.fit) < MUCH:
         return None
     best, names = fitter.root, names_of_all(fitter)
@@ -68,7 +64,7 @@ def at_the_outset(fitter: Fitter) -> Explanation | None:
         best = min(best, found, key=lambda e: e.bic)
         if fitter.excess(best.fit) > LOST:
             break
-    return at_several_speeds(fitter, best) if fitter.excess(best.fit) > LOST else best
+    return best
 
 
 def beside_what_leads(fitter: Fitter, best: Explanation, jobs: int = 1) -> Explanation:
@@ -270,8 +266,9 @@ def _have_traded(one: Fit, other: Fit) -> bool:
 
 
 def _is_of_a_hull(found: Explanation) -> bool:
-    """Whether a set shows a vehicle as they are built, and its heave is damped as theirs is."""
-    return is_real(found.names) and has_usual_heave(found.fit.end)
+    """Whether a set shows a vehicle as they are built, damped as theirs are."""
+    end = found.fit.end
+    return is_real(found.names) and has_usual_heave(end) and has_damped_pitch(end)
 
 
 def _with_a_form(search: "Search", whole: Explanation) -> Explanation:
