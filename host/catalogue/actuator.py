@@ -150,7 +150,8 @@ EFFECTS = (
         sentence="The plane turns no faster than a fixed rate.",
         equation="|delta'| <= plane_rate, that of a lag included",
         manoeuvre="plane steps of different sizes: the time they take grows with the size",
-        probes=((0.3,), (1.0,), (3.0,), (6.0,), (15.0,)),  # the last where a lag is quicker than its limit
+        # Beside a lag it shows only just below the fastest that the lag asks for: no step may be too wide.
+        probes=((0.3,), (0.55,), (1.0,), (1.75,), (3.0,), (6.0,), (15.0,)),
         scales=("rudder",),
         sizes=(),
         actuator=_rate_limit,

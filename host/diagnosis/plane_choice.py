@@ -96,9 +96,7 @@ def likelier_first(
     whole = at_the_outset(leading.fitter)
     if whole is not None and says_all(leading.fitter, whole):
         return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
-    one = None
-    if whole is not None and leading.fitter.excess(whole.fit) > MUCH:
-        one = one_that_says_all(leading.fitter, jobs)
+    one = None if whole is None else one_that_says_all(leading.fitter, whole, jobs)
     if whole is not None and one is None:
         told, whole = _beside_no_single_one([leading, *others], whole, on_progress, jobs, may_leave_out)
         if told:

@@ -189,16 +189,23 @@ def test_what_leads_must_be_more_than_a_part_of_a_sea(
 
 
 @pytest.mark.parametrize(
-    ("leads", "is_white", "left", "says_all"),
+    ("leads", "is_white", "left", "whole", "says_all"),
     [
-        ("rudder_stall", True, MUCH - 0.1, True),
-        ("rudder_stall", True, MUCH + 0.1, False),
-        ("rudder_stall", False, 1.1, False),
-        ("unknown_wandering_moment", True, 1.1, False),  # which follows a turn as well
+        ("rudder_stall", True, MUCH - 0.1, 0.0, True),
+        ("rudder_stall", True, MUCH + 0.1, 0.0, False),
+        ("rudder_stall", True, MUCH - 0.1, -2.0, False),  # the whole is likelier
+        ("rudder_stall", False, 1.1, 0.0, False),
+        ("unknown_wandering_moment", True, 1.1, 0.0, False),  # which follows a turn as well
     ],
 )
 def test_one_effect_that_leaves_nothing_is_found_before_stretches_are_left_out(
-    leads: str, is_white: bool, left: float, says_all: bool, real: Fitter, monkeypatch: pytest.MonkeyPatch
+    leads: str,
+    is_white: bool,
+    left: float,
+    whole: float,
+    says_all: bool,
+    real: Fitter,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     asked: list[str] = []
 
@@ -208,14 +215,33 @@ def test_one_effect_that_leaves_nothing_is_found_before_stretches_are_left_out(
 
     monkeypatch.setattr(Fitter, "grown", grown)
     monkeypatch.setattr(real, "at_first", {})
-    monkeypatch.setattr(real, "excess", lambda _: left)
+    monkeypatch.setattr(real, "excess", lambda fit: 2.0 * MUCH if fit is far else left)
     monkeypatch.setattr(Explanation, "leaves_white", is_white)
-    found = outset.one_that_says_all(real, 1)
+    far = replace(real.root.fit)
+    found = outset.one_that_says_all(real, Explanation(frozenset(), far, whole), 1)
     assert (found is not None and leads in found.names) == says_all
     monkeypatch.setattr(outset, "all_beside", lambda _, one: one)
     monkeypatch.setattr(outset, "_by_fewer", lambda *a: a[2])
     outset._beside_what_leads(real, real.root, (*DRIVE, *IN_TIME), 1)
     assert asked == [*SCANS, *DRIVE, *IN_TIME]  # each fitted once
+
+
+@pytest.mark.parametrize(("left", "asked"), [(LITTLE - 0.1, []), (LITTLE + 0.1, [*DRIVE])])
+def test_where_little_is_left_it_may_be_a_fault_of_the_drive_before_it_is_random_forces(
+    left: float, asked: list[str], real: Fitter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[str] = []
+
+    def each(_: Fitter, names: tuple[str, ...], __: int) -> list[Explanation]:
+        done.extend(names)
+        return [Explanation(real.root.names | {name}, real.root.fit, -1.0) for name in names]
+
+    monkeypatch.setattr(outset, "_each_alone", each)
+    monkeypatch.setattr(real, "excess", lambda _: left)
+    monkeypatch.setattr(Explanation, "leaves_white", True)
+    found = outset.one_that_says_all(real, Explanation(frozenset(), real.root.fit, 0.0), 1)
+    assert done == asked
+    assert (found is not None) == bool(asked)
 
 
 @pytest.mark.parametrize(("damping", "is_enough"), [(-0.5, True), (-0.015, False), (-20.0, False)])

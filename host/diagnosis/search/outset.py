@@ -83,11 +83,19 @@ def beside_what_leads(fitter: Fitter, best: Explanation, jobs: int = 1) -> Expla
     return min([best, *led, *_joined_by(fitter, best, layers, jobs)], key=lambda e: e.bic)
 
 
-def one_that_says_all(fitter: Fitter, jobs: int) -> Explanation | None:
-    """The likeliest of what may lead, alone, if it leaves nothing: no turn is explained so, but by a form."""
-    alone = _each_alone(fitter, (*SCANS, *DRIVE, *IN_TIME), jobs)
+def one_that_says_all(fitter: Fitter, whole: Explanation, jobs: int) -> Explanation | None:
+    """The likeliest of what may lead, alone, if it leaves nothing: no turn is explained so, but by a form.
+
+    What keeps the plane back also where all that every vehicle has does most of its work: but for a little,
+    which random forces would explain.
+    """
+    left = fitter.excess(whole.fit)
+    if left < LITTLE:
+        return None
+    alone = _each_alone(fitter, (*SCANS, *DRIVE, *IN_TIME) if left > MUCH else DRIVE, jobs)
     best = min(alone, key=lambda e: e.bic)
-    return best if says_all(fitter, best) and best.names.isdisjoint(UNKNOWN) else None
+    is_all = says_all(fitter, best) and best.names.isdisjoint(UNKNOWN) and best.bic < whole.bic
+    return best if is_all else None
 
 
 def _what_may_lead(fitter: Fitter, whole: Explanation) -> tuple[str, ...]:
