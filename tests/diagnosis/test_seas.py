@@ -106,6 +106,28 @@ def test_what_swings_may_be_waves_if_it_has_a_period_of_theirs(
     assert ("waves" in said) == (period < 20.0)
 
 
+@pytest.mark.parametrize(("behind", "are_waves"), [(5.0, True), (7.0, False)])
+def test_what_swings_as_waves_do_is_waves_unless_it_is_clearly_likelier(
+    behind: float, are_waves: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def moved(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+        return 0.0, 0.05 * np.sin(2.0 * np.pi * time / 10.0), 0.0
+
+    fitter = Fitter([hidden_dive(moved, duration=60.0)])
+    swinging = fitter.grown(fitter.base, "unknown_swinging_moment", [])
+    among = replace(fitter.base, bic=swinging.bic + behind)
+    where = "host.diagnosis.disturbances.seas"
+    monkeypatch.setattr(f"{where}.is_sea", lambda _: True)
+    monkeypatch.setattr(f"{where}._in_own_waves", lambda *_: [among])
+    monkeypatch.setattr(f"{where}._lean", lambda _, first: first)
+    monkeypatch.setattr(f"{where}.searched_among", lambda *a: a)
+    with Workers(fitter, 1) as workers:
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        _, found, told = among_waves(search, search.remember(swinging), fitter.base)
+    assert (found is among) == are_waves
+    assert told == (swinging.bic if are_waves else None)
+
+
 def test_what_only_passes_for_waves_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     rough = in_waves(lambda time, x, plane: (0.0, 0.0, 0.0), 0.02, 0.06)  # noqa: ARG005
     fitter = Fitter([hidden_dive(rough, duration=60.0)])

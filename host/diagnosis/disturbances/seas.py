@@ -184,6 +184,8 @@ def among_waves(
     A filter that takes waves for white forces follows the measurements in the wrong band, and so hides what
     acts beside them. While sets are compared the waves stay as they were first found: beside the best set,
     or beside the named effects of that found without random forces, whichever is likelier.
+
+    A moment that swings as they do is physics of no catalogue: like any such it has to be clearly likelier.
     """
     fitter, swing = rough.fitter, _swinging_as_waves_do(best)
     if WAVES in best.names and not best.fit.has_process_noise:
@@ -201,7 +203,8 @@ def among_waves(
     if not is_sea(first.fit):
         return rough, best, None
     first, least = _lean(rough, first), as_filtered(fitter, best).bic
-    if first.bic > least - NAMING_MARGIN or not is_sea(first.fit):
+    enough = NAMING_MARGIN if SWINGING_MOMENT.name in swing else -NAMING_MARGIN
+    if first.bic > least + enough or not is_sea(first.fit):
         return rough, best, None
     return searched_among(rough, first, least)
 
