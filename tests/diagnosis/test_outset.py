@@ -188,6 +188,25 @@ def test_what_leads_must_be_more_than_a_part_of_a_sea(
     assert {n for one in found for n in one.names} - real.root.names == ({name} if counts else set())
 
 
+@pytest.mark.parametrize("damping", [-0.5, -1e-4])
+def test_what_leads_keeps_a_hull_at_its_heave(
+    damping: float, real: Fitter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit = real.base.fit
+    hull = replace(fit, parameters=np.where(np.arange(fit.parameters.size) == 0, damping, fit.parameters))
+    whole, led = Explanation(real.root.names, fit, 0.0), Explanation(real.root.names, hull, -9.0)
+    monkeypatch.setattr(
+        outset, "_each_alone", lambda *_: [Explanation(frozenset({"ballast_change"}), hull, -1.0)]
+    )
+    monkeypatch.setattr(outset, "all_beside", lambda _, one: one)
+    monkeypatch.setattr(outset, "_by_fewer", lambda *_: led)
+    monkeypatch.setattr(outset, "_layers", lambda *_: [])
+    monkeypatch.setattr(Explanation, "leaves_white", False)
+    monkeypatch.setattr(real, "excess", lambda _: 0.5 * outset.LOST)
+    found = outset.beside_what_leads(real, whole)
+    assert (found.fit is hull) == (damping == -0.5)
+
+
 @pytest.mark.parametrize(
     ("leads", "is_white", "left", "whole", "says_all"),
     [

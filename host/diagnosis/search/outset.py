@@ -75,7 +75,9 @@ def beside_what_leads(fitter: Fitter, best: Explanation, jobs: int = 1) -> Expla
     """
     names = _what_may_lead(fitter, best)
     if fitter.excess(best.fit) < LOST:
-        best = min(best, _by_fewer(fitter, fitter.root, best, jobs), key=lambda e: e.bic)
+        fewer = _by_fewer(fitter, fitter.root, best, jobs)
+        if says_all(fitter, fewer) or _keeps_heave(fewer, best):
+            best = min(best, fewer, key=lambda e: e.bic)
     if fitter.excess(best.fit) < MUCH:
         return best
     layers = _layers(fitter, best)
@@ -195,11 +197,23 @@ def _beside_what_leads(
 
 
 def _is_no_chance(fitter: Fitter, led: Explanation, whole: Explanation) -> bool:
-    """Whether what leads does more than follow a part of a sea, as many may a little."""
+    """Whether what leads does more than follow a part of a sea, as many may a little.
+
+    Not where it takes the hull from its heave for that.
+    """
     left = fitter.excess(led.fit)
-    if left < LITTLE or says_all(fitter, led) or led.names & {*SCANS}:
+    if left < LITTLE or says_all(fitter, led):
+        return True
+    if not _keeps_heave(led, whole):
+        return False
+    if led.names & {*SCANS}:
         return True
     return led.names.isdisjoint(IN_TIME) and left < HALF * fitter.excess(whole.fit)
+
+
+def _keeps_heave(found: Explanation, whole: Explanation) -> bool:
+    """Whether a set has a hull that heaves as usual, if the whole has: else it heaves to do others' work."""
+    return has_usual_heave(found.fit.end) or not has_usual_heave(whole.fit.end)
 
 
 def pushed_by_forces(search: "Search", whole: Explanation) -> Explanation | None:
