@@ -161,7 +161,7 @@ EFFECTS = (
     Effect(
         name="actuator_lag",
         slot="actuator",
-        parameters=(Parameter(name="lag_time", unit="s", lower=0.01, upper=10, meaning="time constant"),),
+        parameters=(Parameter(name="lag_time", unit="s", lower=0.001, upper=10, meaning="time constant"),),
         sentence="The plane follows its command with a first-order lag.",
         equation="delta' = (command - delta)/lag_time",
         manoeuvre="plane steps of different sizes at a sampling interval below the lag",

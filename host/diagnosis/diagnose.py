@@ -158,7 +158,12 @@ def _diagnosed(
             judged = _judge(explained, spans, floor, on_progress)
     if again is not None:
         on_progress("the plane between rows")
-        return _diagnosed(again, [], on_progress, jobs, explained.best, _ranking(explained.search), True)
+        second = _diagnosed(again, [], on_progress, jobs, explained.best, _ranking(explained.search), True)
+        if is_part or not _is_worse(second, explained):
+            return second
+        with Workers(fitter, jobs) as workers:
+            explained.search.workers = workers
+            judged = _judge(explained, spans, floor, on_progress)
     if is_part:
         on_progress("the whole")
         fitter = Fitter(spans.teaching)
@@ -234,6 +239,11 @@ def _on_all(verdict: Verdict, way: Way) -> Verdict:
 def _is_likelier(other: Way, explained: Explained) -> bool:
     in_own_waves = None if explained.waves is None else explained.waves.fitted
     return is_likelier(other, explained.search, explained.best, in_own_waves)
+
+
+def _is_worse(second: Diagnosis, first: Explained) -> bool:
+    """Whether what promised more with the plane taken another way came to less; not told among forces."""
+    return not (second.has_sea or first.best.fit.has_process_noise) and second.bic > first.best.bic
 
 
 def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callable[[str], None]) -> Judged:

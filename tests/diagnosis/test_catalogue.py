@@ -388,6 +388,18 @@ def test_a_net_weight_drives_a_pitched_hull_along_its_axis(name: str, size: str)
     assert lost == pytest.approx((u0**2 - 2 * u0 * 3.0 * 1.9 * 0.05 * np.sin(theta)) ** 0.5 - u0, rel=1e-3)
 
 
+def test_a_lag_at_its_least_is_none() -> None:
+    # All that every vehicle has includes one: where there is none it must cost nothing.
+    rows, lagging = hidden_dive(duration=30.0), structure_of(("actuator_lag",))
+    values = np.array([*(BASE[name] for name in ("a1", "a2", "a3", "b1", "b2", "u0")), 0.0, 0.0])
+    least = lagging.parameters[-1].lower
+    own = np.append(values, least)
+    ideal = free_run(values, START, inputs_of(rows)).outputs
+    left = free_run(own, START, inputs_of(rows, lagging)).outputs - ideal
+    assert np.abs(left[0]).max() < np.deg2rad(0.02)
+    assert np.abs(left[1]).max() < 1e-3
+
+
 MEMORY = ("actuator_delay", "actuator_rate_limit", "actuator_lag", "actuator_backlash")
 
 

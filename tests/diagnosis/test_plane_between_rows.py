@@ -3,14 +3,15 @@
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from types import SimpleNamespace
+from typing import Any, Literal, cast
 
 import numpy as np
 import pytest
 from hidden_dive import BASE, hidden_dive
 from scipy.integrate import solve_ivp
 
-from host.diagnosis.diagnose import diagnose
+from host.diagnosis.diagnose import _is_worse, diagnose
 from host.diagnosis.disturbances.seas import Explained
 from host.diagnosis.explain import explain
 from host.diagnosis.fits.explanation import Explanation
@@ -247,3 +248,29 @@ def test_what_is_found_may_speak_against_the_first_choice(monkeypatch: pytest.Mo
     assert found.ranking
     assert found.verdict == "no_mismatch"
     assert NOTE in found.recordings[0].notes
+
+
+@pytest.mark.parametrize(
+    ("second", "has_sea", "first", "is_worse"),
+    [(-9.0, False, -10.0, True), (-11.0, False, -10.0, False), (-9.0, True, -10.0, False)],
+)
+def test_two_ways_are_compared_where_neither_is_among_forces(
+    second: float, has_sea: bool, first: float, is_worse: bool
+) -> None:
+    best = SimpleNamespace(bic=first, fit=SimpleNamespace(has_process_noise=has_sea))
+    found, before = SimpleNamespace(bic=second, has_sea=False), SimpleNamespace(best=best)
+    assert _is_worse(cast("Any", found), cast("Any", before)) == is_worse
+
+
+@pytest.mark.long
+def test_what_promised_more_the_other_way_but_came_to_less_is_not_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    said: list[str] = []
+    known = diagnose([dive("moving")])
+    monkeypatch.setattr("host.diagnosis.diagnose.is_likelier", lambda *_: True)
+    found = diagnose([dive("moving")], said.append)
+    assert "the plane between rows" in said
+    assert found.bic == known.bic
+    assert found.recordings[0].has_moving_plane
+    assert found.verdict == known.verdict
