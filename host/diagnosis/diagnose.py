@@ -19,7 +19,7 @@ from host.diagnosis.plane_choice import Way, is_likelier, likelier_first, ways
 from host.diagnosis.plane_moments import with_plane_moments
 from host.diagnosis.proof.deviations import deviations
 from host.diagnosis.proof.locate import Location, locate
-from host.diagnosis.proof.minute import LEAST_ANGLE, minute_in
+from host.diagnosis.proof.minute import LEAST_ANGLE, minute_in, unresolved_in
 from host.diagnosis.proof.scoring import Misfit, foretells, free_run_errors, misfit
 from host.diagnosis.proof.slight import is_slight
 from host.diagnosis.proof.unknown_force import UnknownForce, unknown_force
@@ -212,7 +212,10 @@ def _diagnosed(
         ranking=alone if is_ranked_alone else [(effect.name, effect.delta_bic) for effect in effects],
         is_ranked_alone=is_ranked_alone,
         remaining=" ".join(
-            filter(None, [_apart(way), told, *_unnamed(best, waves), *(_other_answers(found) or hardly)])
+            filter(
+                None,
+                [_apart(way), told, *_unnamed(best, waves, recordings), *(_other_answers(found) or hardly)],
+            )
         ),
         has_sea=best.fit.has_process_noise,
         bic=best.bic,
@@ -258,7 +261,8 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
     # The very waves that were met are chance, and the regular one in their place may come out of step.
     foretelling = best if waves is None else waves.fitted
     before, after = (misfit(one, spans, floor, horizon) for one in (search.base, foretelling))
-    unnamed = minute_in(best) | (frozenset() if waves is None else waves.theirs)
+    late = unresolved_in(best, search.fitter.recordings)
+    unnamed = minute_in(best) | late | (frozenset() if waves is None else waves.theirs)
     effects = [one for one in _named(search, best, spans, floor, after, horizon) if one.name not in unnamed]
     if waves is not None and WAVES not in best.names:
         effects.append(NamedEffect(name=WAVES, delta_bic=waves.delta_bic))
@@ -268,7 +272,7 @@ def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callab
     lean = without_unknown(search, best)
     bare = after if lean is best else misfit(lean, spans, floor, horizon)
     is_trace = waves is None and is_slight(lean, before, bare)
-    verdict = verdict_on(model, left, before, after, evidence(waves), is_told, is_trace)
+    verdict = verdict_on(model, left, before, after, evidence(waves), is_told, is_trace, late)
     return Judged(before, after, effects, verdict, _slots(search, best, effects, verdict))
 
 
@@ -336,18 +340,25 @@ def _ranking(search: Search) -> Ranking:
     return sorted((pair for pair in alone if pair[1] > -inf), key=lambda pair: -pair[1])
 
 
-def _unnamed(best: Explanation, waves: Waves | None) -> list[str]:
-    """Of offsets in the model that are not named."""
+def _unnamed(best: Explanation, waves: Waves | None, recordings: list[Recording]) -> list[str]:
+    """Of what is in the model and not named."""
     angle, theirs = np.rad2deg(LEAST_ANGLE), waves.theirs if waves else frozenset()
     reasons = {
         f"worth less than {angle:.1g} deg of plane: too little to be named": minute_in(best),
         "no larger than what waves themselves do on the mean: it is not named": theirs - minute_in(best),
+        "too short to be told from how the plane moved between rows: it is not named": unresolved_in(
+            best, recordings
+        ),
     }
     return [
-        f"The model holds a {' and '.join(name.replace('_', ' ') for name in sorted(names))} {reason}."
+        f"The model holds {' and '.join(_with_article(name) for name in sorted(names))} {reason}."
         for reason, names in reasons.items()
         if names
     ]
+
+
+def _with_article(name: str) -> str:
+    return f"{'an' if name[0] in 'aeiou' else 'a'} {name.replace('_', ' ')}"
 
 
 def _other_answers(extended: Explanation) -> list[str]:

@@ -11,11 +11,19 @@ from host.diagnosis.diagnose import diagnose
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.leftover import Leftover
-from host.diagnosis.proof.minute import LEAST_ANGLE, minute_in
+from host.diagnosis.proof.minute import LEAST_ANGLE, minute_in, unresolved_in
 from host.diagnosis.proof.scoring import Misfit
 from host.diagnosis.proof.verdict import Verdict, verdict_on
 
+NOTHING = Leftover(
+    is_coloured=False, is_local=False, is_by_speed=False, is_no_sea=False, is_above_floor=False,
+    smooth_gain=0.0, is_smooth=False,
+)  # fmt: skip
 CLIMB, TURN = abs(BASE["a1"]) * BASE["u0"], abs(BASE["b2"])  # m/s^2 and rad/s^2 a radian
+
+
+def misfit(chi2: float) -> Misfit:
+    return Misfit(depth_rmse_m=0.0, pitch_rmse_rad=0.0, chi2_depth=chi2, chi2_pitch=chi2)
 
 
 @pytest.mark.parametrize(
@@ -43,6 +51,33 @@ def test_an_offset_is_measured_by_the_angle_that_holds_it(name: str, largest: fl
 
 
 @pytest.mark.parametrize(
+    ("name", "own", "is_moving", "step", "most"),
+    [
+        ("actuator_lag", "lag_time", True, 0.1, 0.025),
+        ("actuator_delay", "delay", True, 1.0, 0.05),
+        ("actuator_lag", "lag_time", False, 0.1, 0.0),
+    ],
+)
+def test_a_plane_that_moves_between_rows_is_late_by_no_less_than_they_resolve(
+    name: str, own: str, is_moving: bool, step: float, most: float
+) -> None:
+    dive = replace(hidden_dive(duration=20.0), has_moving_plane=is_moving)
+    base, structure = Fitter([dive]).base, structure_of((name,))
+
+    def late(by: float) -> frozenset[str]:
+        known = BASE | {"heave_offset": 0.0, "pitch_offset": 0.0, own: by}
+        fit = replace(base.fit, structure=structure, parameters=np.array([known[n] for n in structure.names]))
+        return unresolved_in(Explanation(frozenset({name}), fit, 0.0), [replace(dive, step=step)])
+
+    assert late(0.99 * most) == ({name} if is_moving else set())
+    assert late(1.01 * most + 1e-3) == frozenset()
+    found, off = replace(base, names=frozenset({name})), misfit(1.0)
+    minute = (frozenset({name}), frozenset[str]())
+    verdicts = [verdict_on(found, NOTHING, off, off, late=unnamed) for unnamed in minute]
+    assert verdicts == ["no_mismatch", "explained"]
+
+
+@pytest.mark.parametrize(
     ("moment", "verdict"),
     [(1.2e-4, "no_mismatch"), pytest.param(1.2e-2, "explained", marks=pytest.mark.long)],
 )
@@ -60,9 +95,5 @@ def test_a_minute_offset_does_not_excuse_what_was_held_out(after: float, verdict
     base, structure = Fitter([hidden_dive(duration=20.0)]).base, structure_of(("rudder_offset",))
     own = BASE | {"heave_offset": 0.0, "pitch_offset": 0.0, "rudder_zero": 1e-5}
     fit = replace(base.fit, structure=structure, parameters=np.array([own[n] for n in structure.names]))
-    left = Leftover(
-        is_coloured=False, is_local=False, is_by_speed=False, is_no_sea=False, is_above_floor=False,
-        smooth_gain=0.0, is_smooth=False,
-    )  # fmt: skip
-    off = Misfit(depth_rmse_m=0.0, pitch_rmse_rad=0.0, chi2_depth=after, chi2_pitch=after)
-    assert verdict_on(Explanation(frozenset({"rudder_offset"}), fit, 0.0), left, off, off) == verdict
+    off = misfit(after)
+    assert verdict_on(Explanation(frozenset({"rudder_offset"}), fit, 0.0), NOTHING, off, off) == verdict

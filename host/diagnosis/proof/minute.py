@@ -1,16 +1,21 @@
-"""Offsets too small to be worth a name.
+"""What is too small to be worth a name: offsets, and a plane that is late by less than its rows resolve.
 
 Over minutes a depth to a centimetre tells a moment that a ten-thousandth of a degree of plane would hold: no
 servo is so true, and the mean of what is not quite linear does as much. The model keeps it, as it is likelier
-so; but to name it would send somebody to look for a weight that is not there.
+so; but to name it would send somebody to look for a weight that is not there. Nor is a slow servo to be
+looked for where the plane is late by a fraction of a row: one that moved between rows was set in steps of its
+own.
 """
 
 import numpy as np
 
 from host.catalogue.kin import OFFSETS, as_trim
 from host.diagnosis.fits.explanation import Explanation, Names
+from host.recordings.recording import Recording
 
 LEAST_ANGLE = 5e-5  # rad, 0.003 deg: of plane, or of the climb that is due to a force
+SHORT, SHORTEST = 0.25, 0.05  # of the time between rows, and s: commands of 20 Hz are late by half of that
+LATE = {"actuator_lag": "lag_time", "actuator_delay": "delay"}
 
 
 def minute_in(explanation: Explanation) -> Names:
@@ -28,3 +33,13 @@ def minute_in(explanation: Explanation) -> Names:
             if (np.abs(as_trim(known, effect.name) @ sizes) < largest).all():
                 found.add(effect.name)
     return frozenset(found)
+
+
+def unresolved_in(explanation: Explanation, recordings: list[Recording]) -> Names:
+    """What makes a plane late by less than a quarter of a row, where it moved on between rows."""
+    if not any(recording.has_moving_plane for recording in recordings):
+        return frozenset()
+    fit = explanation.fit
+    known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
+    most = min(SHORTEST, SHORT * min(recording.step for recording in recordings))
+    return frozenset(name for name in explanation.names & LATE.keys() if known[LATE[name]] < most)

@@ -17,7 +17,7 @@ from host.catalogue import BY_NAME, FAINT, ORDINARY
 from host.catalogue.gravity import GRAVITY
 from host.catalogue.kin import OFFSETS
 from host.catalogue.nuisance import SPEED_CORRECTION
-from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.leftover import SEA_DOUBT, Leftover
 from host.diagnosis.proof.minute import minute_in
 from host.diagnosis.proof.scoring import Misfit
@@ -70,18 +70,20 @@ def verdict_on(
     waves: float = inf,
     foretells: bool = True,
     is_slight: bool = False,
+    late: Names = frozenset(),
 ) -> Verdict:
     """Of an explanation, by what it leaves and how far it betters the base on held-out spans.
 
     waves      by how much of BIC those it was found among, if any, are likelier than no waves
     foretells  whether it foretells the next seconds there better than the base, if no free run can tell
     is_slight  what it leaves is a trace (host.diagnosis.proof.slight)
+    late       what is no more than rows resolve (host.diagnosis.proof.minute)
     """
     if left.is_nothing and not best.names:
         return "no_mismatch"
     # Random forces spoil a free run whatever is known: it need not be better for knowing more.
     worst = max(before.chi2 * (SEA_DOUBT if best.fit.has_process_noise else 1.0), WORSE)
-    if left.is_nothing and after.chi2 < WORSE and best.names == minute_in(best):
+    if left.is_nothing and after.chi2 < WORSE and best.names == minute_in(best) | late:
         return "no_mismatch"
     if is_slight or (left.is_nothing and after.chi2 < worst and not unknown_in(best)):
         return "explained" if foretells and not _doubt(best, left, waves) else "partly_explained"
