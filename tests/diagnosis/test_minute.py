@@ -7,7 +7,7 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import structure_of
-from host.diagnosis.diagnose import diagnose
+from host.diagnosis.diagnose import _unnamed, diagnose
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.leftover import Leftover
@@ -67,7 +67,10 @@ def test_a_plane_that_moves_between_rows_is_late_by_no_less_than_they_resolve(
     def late(by: float) -> frozenset[str]:
         known = BASE | {"heave_offset": 0.0, "pitch_offset": 0.0, own: by}
         fit = replace(base.fit, structure=structure, parameters=np.array([known[n] for n in structure.names]))
-        return unresolved_in(Explanation(frozenset({name}), fit, 0.0), [replace(dive, step=step)])
+        best, read = Explanation(frozenset({name}), fit, 0.0), [replace(dive, step=step)]
+        (said,) = _unnamed(best, None, read) or [""]
+        assert f"The model holds an {name.replace('_', ' ')} too short" in said or not said
+        return unresolved_in(best, read)
 
     assert late(0.99 * most) == ({name} if is_moving else set())
     assert late(1.01 * most + 1e-3) == frozenset()

@@ -262,5 +262,5 @@ def test_an_offset_that_is_the_waves_own_stays_in_the_model_without_a_name() -> 
                 Explained(best, search, leftover(fitter, best), told), spans, fitter.floor, lambda _: None
             )
             assert {effect.name for effect in judged.effects} == named
-            assert ["trim moment" in said for said in _unnamed(best, told)] == [True] * len(theirs)
-    assert _unnamed(fitter.base, None) == []
+            assert ["trim moment" in said for said in _unnamed(best, told, [])] == [True] * len(theirs)
+    assert _unnamed(fitter.base, None, []) == []
