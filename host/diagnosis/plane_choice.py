@@ -98,7 +98,7 @@ def likelier_first(
         return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
     one = None if whole is None else one_that_says_all(leading.fitter, whole, jobs)
     if whole is not None and one is None:
-        told, whole = _beside_no_single_one([leading, *others], whole, on_progress, jobs, may_leave_out)
+        told, whole = _at_speeds_or_in_short_runs([leading, *others], whole, on_progress, jobs, may_leave_out)
         if told:
             return told
     if whole is not None:
@@ -129,7 +129,7 @@ def likelier_first(
     return pushed or (begun if leads else by_single_effects(found, on_progress, jobs))
 
 
-def _beside_no_single_one(
+def _at_speeds_or_in_short_runs(
     found: list[Way], whole: Explanation, on_progress: Callable[[str], None], jobs: int, may_leave_out: bool
 ) -> tuple[list[Way], Explanation]:
     """The ways at several speeds, or as short runs tell them, none where neither does; and the whole."""

@@ -15,7 +15,7 @@ from host.recordings.recording import Recording
 
 LEAST_ANGLE = 5e-5  # rad, 0.003 deg: of plane, or of the climb that is due to a force
 SHORT, SHORTEST = 0.25, 0.05  # of the time between rows, and s: commands of 20 Hz are late by half of that
-LATE = {"actuator_lag": "lag_time", "actuator_delay": "delay"}
+TIMES = {"actuator_lag": "lag_time", "actuator_delay": "delay"}
 
 
 def minute_in(explanation: Explanation) -> Names:
@@ -42,4 +42,4 @@ def unresolved_in(explanation: Explanation, recordings: list[Recording]) -> Name
     fit = explanation.fit
     known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
     most = min(SHORTEST, SHORT * min(recording.step for recording in recordings))
-    return frozenset(name for name in explanation.names & LATE.keys() if known[LATE[name]] < most)
+    return frozenset(name for name in explanation.names & TIMES.keys() if known[TIMES[name]] < most)

@@ -8,12 +8,13 @@ less than many.
 from typing import TYPE_CHECKING
 
 from host.catalogue import UNKNOWN, named
+from host.catalogue.kin import is_time
 from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import WANDERING
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.margins import FEW, LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN, SMALL, margin
 from host.diagnosis.fits.workers import Task
-from host.diagnosis.search.candidates import candidates
+from host.diagnosis.search.candidates import candidates, eligible
 from host.diagnosis.search.lone_form import lone_form
 from host.diagnosis.search.offset_choice import with_offset
 from host.diagnosis.search.together import at_once, together
@@ -25,7 +26,6 @@ BEAM = 4  # single effects carried on
 FAIR_PART = 0.3  # of what the best set gains: what explains less is no parent
 NARROW = 2  # of larger sets, which cost most and of which there are most
 PROMISING = 6
-LATE = ("actuator_delay", "actuator_lag", "pitch_sensor_lag", "depth_sensor_lag")
 FAR_LESS = 0.5  # of what a dozen effects leave: two that come so near are the way to go on
 
 
@@ -104,8 +104,9 @@ def _with_best_pair(search: "Search", singles: list[Explanation]) -> list[Explan
     """
     first, *others = singles
     names = [name for one in others for name in one.names - first.names]
-    own = [name for name in LATE if name in first.names]
-    late = [name for name in LATE if name not in first.names] if own else []
+    times = [effect.name for effect in eligible(search) if is_time(effect)]
+    own = [name for name in times if name in first.names]
+    late = [name for name in times if name not in first.names] if own else []
     tasks = [search.growth(first, name) for name in dict.fromkeys([*names, *late])]
     alone = [search.tried.get(search.root.names | {name}) for name in late]
     tasks += [search.growth(one, name) for one in alone if one is not None for name in own]
