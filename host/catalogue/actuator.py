@@ -7,6 +7,8 @@ from host.dynamics.equations import Chain, Effect, Parameter
 
 SLIGHT = 1e-12  # share of a sub-step, so that no part of it is empty
 LEAST_MOVED = 1e-9  # rad, of a servo that moves
+AT_REST = 1e-4  # rad: by less a plane moves in a sub-step as if it stood, to a hundredth of that
+NEVER = 1e-9  # of lift that does not fall: so far off it would keep a share
 
 
 def _offset(c: Chain) -> None:
@@ -91,10 +93,28 @@ def _kept_within(plane: ca.SX, servo: ca.SX, half: ca.SX) -> ca.SX:
 
 
 def _stall(c: Chain) -> None:
-    size, angle, loss = ca.fabs(c.plane), c.p["stall_angle"], c.p["stall_loss"]
-    falling, least = size - loss * (size - angle), c.p["stall_share"] * angle
-    c.change = c.change * ca.if_else(size < angle, 1, (1 - loss) * (falling > least))
-    c.plane = ca.sign(c.plane) * ca.if_else(size < angle, size, ca.fmax(falling, least))
+    """By its mean over the sub-step: the plane may pass the angle at which lift breaks within it."""
+    begin, end = c.plane - c.change / 2, c.plane + c.change / 2
+    is_moved = ca.fabs(c.change) > AT_REST
+    mean = (_stalled_area(c.p, end) - _stalled_area(c.p, begin)) / ca.if_else(is_moved, c.change, 1)
+    c.plane = ca.if_else(is_moved, mean, _stalled(c.p, c.plane))
+    c.change = _stalled(c.p, end) - _stalled(c.p, begin)
+
+
+def _stalled(p: dict[str, ca.SX], plane: ca.SX) -> ca.SX:
+    """The angle at which the plane acts: as it stands, falling from the stall on, and never below a share."""
+    size, angle = ca.fabs(plane), p["stall_angle"]
+    falling = size - p["stall_loss"] * (size - angle)
+    return ca.sign(plane) * ca.if_else(size < angle, size, ca.fmax(falling, p["stall_share"] * angle))
+
+
+def _stalled_area(p: dict[str, ca.SX], plane: ca.SX) -> ca.SX:
+    """The integral of that from 0."""
+    size, angle, loss = ca.fabs(plane), p["stall_angle"], p["stall_loss"]
+    last = angle * (1 + (1 - p["stall_share"]) / ca.fmax(loss - 1, NEVER))  # from here on a share is kept
+    attached, beyond = ca.fmin(size, angle), ca.fmin(ca.fmax(size - angle, 0), last - angle)
+    kept = p["stall_share"] * angle * ca.fmax(size - last, 0)
+    return attached**2 / 2 + angle * beyond + (1 - loss) * beyond**2 / 2 + kept
 
 
 def _effectiveness(c: Chain) -> None:

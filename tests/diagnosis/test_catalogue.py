@@ -39,7 +39,11 @@ def test_catalogue_holds_every_name_that_users_rely_on() -> None:
     assert {effect.name for effect in CATALOGUE} >= NAMES_OF_THE_FORMAT
 
 
-PAIRS = [("actuator_lag", "actuator_rate_limit"), ("depth_sensor_lag", "depth_sensor_lever_arm")]
+PAIRS = [
+    ("actuator_lag", "actuator_rate_limit"),
+    ("actuator_lag", "rudder_stall"),
+    ("depth_sensor_lag", "depth_sensor_lever_arm"),
+]
 WITH_WHAT_THEY_CHANGE = [(*effect.changes, name) for name, effect in sorted(BY_NAME.items())]
 
 
@@ -153,6 +157,20 @@ def test_a_stalled_plane_keeps_a_share_of_its_greatest_lift(share: float) -> Non
     )
     np.testing.assert_allclose(run.outputs, true.outputs, atol=1e-9)
     assert size.max() > 0.1
+
+
+@pytest.mark.parametrize(("lag", "most"), [(0.1, 5e-4), (0.15, 2e-4), (0.4, 1e-4)])
+@pytest.mark.parametrize("loss", [0.7, 1.0, 1.6, 2.5])
+def test_a_slow_plane_stalls_where_it_passes_the_angle_however_coarse_the_rows(
+    lag: float, most: float, loss: float
+) -> None:
+    rows, structure = hidden_dive(duration=30.0), structure_of(("actuator_lag", "rudder_stall"))
+    stall = {"lag_time": lag, "stall_angle": 0.08, "stall_loss": loss, "stall_share": 0.3}
+    known = dict.fromkeys(structure.names, 0.0) | BASE | stall
+    values = np.array([known[name] for name in structure.names])
+    run = free_run(values, START, inputs_of(rows, structure, longest_substep=0.1)).outputs
+    true = free_run(values, START, inputs_of(finer(finer(rows)), structure)).outputs[:, :: EACH**2]
+    assert np.abs(run - true)[0].max() < most  # rad
 
 
 @pytest.mark.parametrize("lag", [0.05, 0.6])

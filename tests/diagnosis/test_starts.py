@@ -334,7 +334,7 @@ def test_reversals_of_one_size_hardly_tell_where_a_plane_stalls() -> None:
     right = output_error(
         Point(structure, true, [AT_REST], np.zeros(4)), fitter.inputs(names), fitter.free(names)
     )
-    assert wrong.log_likelihood < right.log_likelihood - 10.0
+    assert wrong.log_likelihood < right.log_likelihood - 4.0
     assert best.log_likelihood > right.log_likelihood - 0.1
     assert with_stall_moved(Point(structure_of(()), true[:8], [AT_REST], np.zeros(4))) == []
 
