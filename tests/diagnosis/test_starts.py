@@ -18,6 +18,7 @@ from host.likelihood.fit import Fit
 from host.likelihood.gauss_newton import Point
 from host.likelihood.output_error import output_error
 from host.likelihood.valleys import (
+    ALMOST_AS_LIKELY,
     has_usual_heave,
     other_valleys,
     with_depth_lag_swapped,
@@ -335,7 +336,7 @@ def test_reversals_of_one_size_hardly_tell_where_a_plane_stalls() -> None:
         Point(structure, true, [AT_REST], np.zeros(4)), fitter.inputs(names), fitter.free(names)
     )
     assert wrong.log_likelihood < right.log_likelihood - 4.0
-    assert best.log_likelihood > right.log_likelihood - 0.1
+    assert best.log_likelihood > right.log_likelihood - ALMOST_AS_LIKELY
     assert with_stall_moved(Point(structure_of(()), true[:8], [AT_REST], np.zeros(4))) == []
 
 
