@@ -18,6 +18,9 @@ PITCHING_INTO_DEPTH = (
 """Effects that move the recorded depth with the pitch rate; the base, bent for each its own way, does the
 rest."""
 
+AS_A_LEVER = {"depth_sensor_lever_arm": "sensor_forward", "heave_pitch_acceleration_coupling": "c_wa"}
+"""Of those, two that do the very same beside another coupling and pitch damping, with their sizes."""
+
 
 def is_time(effect: Effect) -> bool:
     """Whether a delay or a time constant is all that it has."""

@@ -13,6 +13,7 @@ from host.diagnosis.explain import explain
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.leftover import Leftover
+from host.diagnosis.fits.margins import NAMING_MARGIN
 from host.diagnosis.fits.sea_fits import WAVES, again_in_waves, again_under_forces, with_regular_waves
 from host.diagnosis.fits.workers import Workers, sharing
 from host.diagnosis.plane_choice import Way, is_likelier, likelier_first, ways
@@ -159,7 +160,7 @@ def _diagnosed(
     if again is not None:
         on_progress("the plane between rows")
         second = _diagnosed(again, [], on_progress, jobs, explained.best, _ranking(explained.search), True)
-        if is_part or not _is_worse(second, explained):
+        if is_part or not _is_no_better(second, explained):
             return second
         with Workers(fitter, jobs) as workers:
             explained.search.workers = workers
@@ -244,9 +245,11 @@ def _is_likelier(other: Way, explained: Explained) -> bool:
     return is_likelier(other, explained.search, explained.best, in_own_waves)
 
 
-def _is_worse(second: Diagnosis, first: Explained) -> bool:
-    """Whether what promised more with the plane taken another way came to less; not told among forces."""
-    return not (second.has_sea or first.best.fit.has_process_noise) and second.bic > first.best.bic
+def _is_no_better(second: Diagnosis, first: Explained) -> bool:
+    """Whether what promised more with the plane taken another way came to no more; not told among forces."""
+    if second.has_sea or first.best.fit.has_process_noise:
+        return False
+    return second.bic > first.best.bic - NAMING_MARGIN
 
 
 def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callable[[str], None]) -> Judged:

@@ -11,7 +11,7 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 from scipy.integrate import solve_ivp
 
-from host.diagnosis.diagnose import _is_worse, diagnose
+from host.diagnosis.diagnose import _is_no_better, diagnose
 from host.diagnosis.disturbances.seas import Explained
 from host.diagnosis.explain import explain
 from host.diagnosis.fits.explanation import Explanation
@@ -251,15 +251,20 @@ def test_what_is_found_may_speak_against_the_first_choice(monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize(
-    ("second", "has_sea", "first", "is_worse"),
-    [(-9.0, False, -10.0, True), (-11.0, False, -10.0, False), (-9.0, True, -10.0, False)],
+    ("second", "has_sea", "first", "is_no_better"),
+    [
+        (-9.0, False, -10.0, True),
+        (-15.0, False, -10.0, True),
+        (-17.0, False, -10.0, False),
+        (-9.0, True, -10.0, False),
+    ],
 )
 def test_two_ways_are_compared_where_neither_is_among_forces(
-    second: float, has_sea: bool, first: float, is_worse: bool
+    second: float, has_sea: bool, first: float, is_no_better: bool
 ) -> None:
     best = SimpleNamespace(bic=first, fit=SimpleNamespace(has_process_noise=has_sea))
     found, before = SimpleNamespace(bic=second, has_sea=False), SimpleNamespace(best=best)
-    assert _is_worse(cast("Any", found), cast("Any", before)) == is_worse
+    assert _is_no_better(cast("Any", found), cast("Any", before)) == is_no_better
 
 
 @pytest.mark.long

@@ -1,6 +1,7 @@
 """Where fits of sets begin: at the likeliest moment, in every valley that a lag or a bent base may hide."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -8,11 +9,19 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import named, structure_of
+from host.catalogue.kin import AS_A_LEVER
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.prospects import probed, whitened_at
-from host.diagnosis.fits.starts import SLUGGISH, with_other_moments, with_usual_heave, with_usual_pitch
+from host.diagnosis.fits.starts import (
+    SLUGGISH,
+    _with_depth_moved_alike,
+    with_other_moments,
+    with_usual_heave,
+    with_usual_pitch,
+)
 from host.diagnosis.proof.deviations import deviations
+from host.diagnosis.search.exchange import _is_close_kin
 from host.dynamics.propagate import free_run, inputs_of
 from host.likelihood.fit import Fit
 from host.likelihood.gauss_newton import Point
@@ -449,3 +458,35 @@ def test_a_buoyancy_beside_a_lag_is_found_although_each_alone_is_far_off() -> No
     assert fitter.excess(found.fit) < 1.5
     lag = dict(zip(found.fit.structure.names, found.fit.parameters.tolist(), strict=True))["pitch_lag_time"]
     assert lag == pytest.approx(1.04, rel=0.1)
+
+
+@pytest.mark.parametrize("is_lever", [True, False])
+def test_a_lever_arm_moves_the_depth_as_what_the_pitch_acceleration_does_to_heave(is_lever: bool) -> None:
+    rows = hidden_dive(duration=30.0)
+    rows = replace(rows, rudder=0.1 * rows.rudder)  # as far as an angle is its sine
+    base = Fitter([rows]).base
+    pair = ["heave_pitch_acceleration_coupling", "depth_sensor_lever_arm"]
+    others = frozenset({"heave_pitch_rate_coupling", "munk_moment"})
+    name, other = pair if not is_lever else pair[::-1]
+    structure = structure_of(others | {other})
+    known = dict.fromkeys(structure.names, 0.0) | BASE | {"c_wq": 0.5, "c_qw": 0.7}
+    known |= {"sensor_forward": 0.8} if other == "depth_sensor_lever_arm" else {"c_wa": -0.8}
+    values = np.array([known[own] for own in structure.names])
+    fit = replace(base.fit, structure=structure, parameters=values, free=np.ones(values.size, dtype=bool))
+    rival, parent = Explanation(others | {other}, fit, 0.0), Explanation(others, base.fit, 0.0)
+    fitter: Any = SimpleNamespace(
+        point=lambda names, _, added, probe: Point(
+            structure_of(names),
+            np.array([(known | {AS_A_LEVER[added]: float(probe[0])})[n] for n in structure_of(names).names]),
+            fit.initial,
+            fit.levels,
+        )
+    )
+    (start,) = _with_depth_moved_alike(fitter, rival, parent, name)
+    run = free_run(values, AT_REST, inputs_of(rows, structure)).outputs
+    same = free_run(start.parameters, AT_REST, inputs_of(rows, start.structure)).outputs
+    assert np.abs(same - run)[0].max() < 1e-6
+    assert np.abs(same - run)[1].max() < 2e-4
+    assert np.abs(run[1] - run[1].mean()).max() > 0.1
+    assert _with_depth_moved_alike(fitter, rival, parent, "depth_sensor_lag") == []
+    assert _is_close_kin(name, other)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from host.catalogue import named, structure_of
-from host.catalogue.kin import measure_alike
+from host.catalogue.kin import AS_A_LEVER, measure_alike
 from host.catalogue.moments import FIRST, LAST
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.first_guess import first_guess
@@ -45,7 +45,8 @@ def starts_of(
     starts = [fitter.point(names, parent, name, probe) for _, probe in likely]
     if rival is not None:
         probes = [probe for _, probe in likely] + _same_size(fitter, rival, parent, name)
-        return starts + [fitter.point(names, rival, name, probe) for probe in probes]
+        starts += [fitter.point(names, rival, name, probe) for probe in probes]
+        return starts + _with_depth_moved_alike(fitter, rival, parent, name)
     guesses = [guess(fitter, starts[0], names)] if may_be_bent(fitter, parent) else []
     if is_far(fitter, parent):
         del starts[1:]
@@ -214,3 +215,25 @@ def _same_size(fitter: "Fitter", rival: Explanation, parent: Explanation, name: 
     value = rival.fit.parameters[rival.fit.structure.names.index(its.parameters[0].name)]
     scales = [fitter.scales[scale] for scale in (effect.scales or ("",) * len(effect.parameters))]
     return [np.array([value, *(np.array(effect.probes[0]) * scales)[1:]])]
+
+
+def _with_depth_moved_alike(
+    fitter: "Fitter", rival: Explanation, parent: Explanation, name: str
+) -> list[Point]:
+    """The start at which a lever arm of the depth sensor stands for what q' does to heave, or the other way.
+
+    A sensor x ahead moves by w_s = w - x q, which follows the equations of w and q themselves with
+
+        c_wa = -x,    c_wq + a1 x,    a2 + c_qw x
+
+    in the place of c_wq and a2: far from where either is none.
+    """
+    (other,) = rival.names - parent.names
+    if {name, other} != {*AS_A_LEVER}:
+        return []
+    known = dict(zip(rival.fit.structure.names, rival.fit.parameters.tolist(), strict=True))
+    size = known[AS_A_LEVER[other]]
+    start = fitter.point(parent.names | {name}, rival, name, np.array([-size]))
+    beside = {"c_wq": known["a1"] * size, "a2": known.get("c_qw", 0.0) * size}
+    moved = [beside.get(own, 0.0) for own in start.structure.names]
+    return [replace(start, parameters=start.structure.clipped(start.parameters + moved))]

@@ -4,7 +4,7 @@ from math import log
 from typing import TYPE_CHECKING
 
 from host.catalogue import BY_NAME, ORDINARY, named
-from host.catalogue.kin import OFFSETS, PITCHING_INTO_DEPTH, both_come, measure_alike
+from host.catalogue.kin import AS_A_LEVER, OFFSETS, PITCHING_INTO_DEPTH, both_come, measure_alike
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import FEW, LARGEST_SET, NAMING_MARGIN, SMALL, TWIN_MARGIN, margin
@@ -98,7 +98,7 @@ def _is_kin(search: "Search", name: str, member: str) -> bool:
 
 def _is_close_kin(name: str, member: str) -> bool:
     one, other = named(name), named(member)
-    return measure_alike(one, other) or both_come(one, other)
+    return measure_alike(one, other) or both_come(one, other) or {name, member} == {*AS_A_LEVER}
 
 
 def twins(search: "Search", best: Explanation, name: str) -> list[str]:
