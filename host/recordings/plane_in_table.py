@@ -20,23 +20,27 @@ ON_A_ROW = 0.1  # of a step
 def plane_readings(time: Array, rudder: Array, step: float) -> PlaneReadings | None:
     """The readings in a table's column, rad (N,), NaN where it has none; None where each row has its own."""
     known = np.flatnonzero(np.isfinite(rudder))
-    rows = known[_read(time[known], rudder[known], step)]
+    is_read, turns = _read(time[known], rudder[known], step)
+    rows = known[is_read]
     if rows.size < 2 or not (np.diff(time[rows]) > UNSEEN * step).any():
         return None
-    is_doubtful = rows.size < known.size and bool(np.median(np.diff(time[rows])) > LONGEST_HELD)
+    is_doubtful = rows.size < known.size and bool(np.median(np.diff(time[known[turns]])) > LONGEST_HELD)
     found = PlaneReadings(time[rows], rudder[rows], step, pace=step, is_doubtful=is_doubtful)
     return None if is_doubtful and not found.is_stepping else found
 
 
-def _read(time: Array, rudder: Array, step: float) -> NDArray[np.bool_]:
-    """Which of the rows were read, where a logger repeated readings in those that follow, or drew lines."""
+def _read(time: Array, rudder: Array, step: float) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
+    """Which of the rows were read, where a logger repeated readings in those that follow, or drew lines.
+
+    And the rows at which the plane turned, that tell it; all and none where each row may have been read.
+    """
     slopes = np.diff(rudder) / np.diff(time)
     bends = np.abs(np.diff(slopes))
     for turns in (np.flatnonzero(slopes), np.flatnonzero(bends > ROUNDED * bends.max(initial=0.0))):
         read = _every_few(time, turns + 1, step)
         if read is not None:
-            return read
-    return np.ones(time.size, dtype=bool)
+            return read, turns + 1
+    return np.ones(time.size, dtype=bool), np.empty(0, dtype=np.intp)
 
 
 def _every_few(time: Array, turns: NDArray[np.intp], step: float) -> NDArray[np.bool_] | None:

@@ -181,3 +181,15 @@ def test_a_recording_is_moved_once(tmp_path: Path) -> None:
     assert moved.rudder == pytest.approx(between_readings(recording, recording.plane).rudder)
     assert np.abs(moved.rudder - recording.rudder).max() > 0.05
     assert with_moving_plane(moved) is moved
+
+
+def test_a_program_of_even_units_may_be_the_plane_s_own() -> None:
+    time = 0.1 * np.arange(2400)
+    signs = np.repeat([1.0, -1.0, 1.0, -1.0, 0.0], [48, 32, 16, 16, 140])  # 3-2-1-1 of 1.6 s, a pause of 14 s
+    program = 0.2 * np.concatenate([np.zeros(50), np.tile(signs, 10)])[: time.size]
+    plane = plane_readings(time, program, 0.1)
+    assert plane is not None  # all turns lie on every second row
+    assert plane.is_doubtful
+    swinging = plane_readings(time, np.repeat(0.1 * np.sin(0.4 * time[::2]), 2), 0.1)
+    assert swinging is not None
+    assert not swinging.is_doubtful
