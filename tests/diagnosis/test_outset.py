@@ -188,6 +188,30 @@ def test_what_leads_must_be_more_than_a_part_of_a_sea(
     assert {n for one in found for n in one.names} - real.root.names == ({name} if counts else set())
 
 
+@pytest.mark.parametrize("gain", [1.0, -1.0])
+def test_two_offsets_stand_for_a_free_trim_where_one_alone_is_worse(
+    gain: float, real: Fitter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pair = frozenset({"rudder_offset", "net_buoyancy"})
+
+    def retrimmed(_: Fitter, whole: Explanation, offsets: frozenset[str]) -> Explanation:
+        worth = gain if offsets == pair else -9.0
+        return Explanation(whole.names - {FREE_TRIM.name} | offsets, whole.fit, whole.bic - worth)
+
+    monkeypatch.setattr(outset, "retrimmed", retrimmed)
+    monkeypatch.setattr(Fitter, "polished", lambda _, one: one)
+    monkeypatch.setattr(Explanation, "leaves_white", property(lambda one: one.names >= pair))
+    monkeypatch.setattr(real, "excess", lambda _: 1.9)
+    monkeypatch.setattr(
+        outset, "_by_fewer", lambda *_: pytest.fail("nothing is left") if gain > 0.0 else whole
+    )
+    monkeypatch.setattr(outset, "_layers", lambda *_: [])
+    whole = Explanation(frozenset({FREE_TRIM.name, "actuator_lag"}), real.root.fit, 0.0)
+    found = outset.beside_what_leads(real, whole)
+    assert (found.names >= pair) == (gain > 0.0)
+    assert outset._with_two_offsets(real, replace(whole, names=frozenset({"actuator_lag"})), 1).bic == 0.0
+
+
 @pytest.mark.parametrize("damping", [-0.5, -1e-4])
 def test_what_leads_keeps_a_hull_at_its_heave(
     damping: float, real: Fitter, monkeypatch: pytest.MonkeyPatch
@@ -199,6 +223,7 @@ def test_what_leads_keeps_a_hull_at_its_heave(
         outset, "_each_alone", lambda *_: [Explanation(frozenset({"ballast_change"}), hull, -1.0)]
     )
     monkeypatch.setattr(outset, "all_beside", lambda _, one: one)
+    monkeypatch.setattr(outset, "_with_two_offsets", lambda *_: whole)
     monkeypatch.setattr(outset, "_by_fewer", lambda *_: led)
     monkeypatch.setattr(outset, "_layers", lambda *_: [])
     monkeypatch.setattr(Explanation, "leaves_white", False)
