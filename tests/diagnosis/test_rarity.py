@@ -76,7 +76,7 @@ def test_a_rare_effect_stays_whose_work_nothing_usual_does() -> None:
         pitch[k] = pitch[k - 1] + (recording.pitch[k] - pitch[k - 1]) * (1 - np.exp(-recording.step / FILTER))
     noise = np.deg2rad(0.1) * np.random.default_rng(1).standard_normal(pitch.size)
     slow = replace(recording, pitch=pitch + noise)
-    search, best = searched(slow, *REAL, "pitch_sensor_lag")
+    search, best = searched(slow, *REAL, "heave_quadratic_drag", "pitch_sensor_lag")
     assert told_by_the_usual(search, best).names >= {"pitch_sensor_lag"}
 
 
