@@ -17,6 +17,7 @@ from host.diagnosis.disturbances.seas import (
     _rough,
     against,
     among_waves,
+    evidence,
     explains_more,
     in_plain_waves,
     left_among,
@@ -120,12 +121,20 @@ def test_what_swings_as_waves_do_is_waves_unless_it_is_clearly_likelier(
     monkeypatch.setattr(f"{where}.is_sea", lambda _: True)
     monkeypatch.setattr(f"{where}._in_own_waves", lambda *_: [among])
     monkeypatch.setattr(f"{where}._lean", lambda _, first: first)
-    monkeypatch.setattr(f"{where}.searched_among", lambda *a: a)
+    told = Waves(delta_bic=among.bic, fitted=among, model=among, theirs=frozenset())
+    monkeypatch.setattr(
+        f"{where}.searched_among",
+        lambda search, first, least: (search, first, replace(told, delta_bic=least - first.bic)),
+    )
     with Workers(fitter, 1) as workers:
         search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
-        _, found, told = among_waves(search, search.remember(swinging), fitter.base)
+        search.remember(fitter.base)
+        _, found, waves = among_waves(search, search.remember(swinging), fitter.base)
     assert (found is among) == are_waves
-    assert told == (swinging.bic if are_waves else None)
+    assert (waves is not None) == are_waves
+    if waves is not None:  # worth what nothing in their place loses, and no likelier than that moment
+        assert waves.delta_bic > 10.0
+        assert evidence(waves) == pytest.approx(-behind)
 
 
 def test_what_only_passes_for_waves_is_none(monkeypatch: pytest.MonkeyPatch) -> None:

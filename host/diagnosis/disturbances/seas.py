@@ -39,7 +39,8 @@ MEAN_MOMENTS = 2.0  # of what it may be: four seas came to 1.0 to 1.3
 class Waves:
     """Surface waves that were named by their swing.
 
-    delta_bic  what white random forces in their place lose
+    delta_bic  what white random forces in their place lose, or nothing
+    rivalled   of that, what a moment that swings as they do would take as well
     fitted     what was found beside them, their band and height estimated with it
     model      the same with the regular wave nearest to them, to be simulated
     theirs     offsets in it that are no larger than what waves do on the mean: no physics of the vehicle's
@@ -49,6 +50,7 @@ class Waves:
     fitted: Explanation
     model: Explanation
     theirs: Names
+    rivalled: float = 0.0
 
 
 class Explained(NamedTuple):
@@ -66,7 +68,7 @@ class Explained(NamedTuple):
 
 def evidence(waves: Waves | None) -> float:
     """What speaks for the waves: nothing that doubts them where there are none."""
-    return inf if waves is None else waves.delta_bic
+    return inf if waves is None else waves.delta_bic - waves.rivalled
 
 
 def in_a_sea(calm: Search, best: Explanation) -> tuple[Search, Explanation]:
@@ -206,7 +208,9 @@ def among_waves(
     enough = NAMING_MARGIN if SWINGING_MOMENT.name in swing else -NAMING_MARGIN
     if first.bic > least + enough or not is_sea(first.fit):
         return rough, best, None
-    return searched_among(rough, first, least)
+    without = min(as_filtered(fitter, plain).bic, white.bic) if swing else least
+    search, found, told = searched_among(rough, first, without)
+    return search, found, replace(told, rivalled=without - least)
 
 
 def _swinging_as_waves_do(best: Explanation) -> Names:

@@ -72,7 +72,7 @@ def beside_what_leads(fitter: Fitter, best: Explanation, jobs: int = 1) -> Expla
     """The same beside what changes at a moment, goes with time or keeps the plane back, if that leaves less.
 
     Or, if that promises most, goes with the depth. Where it leads nowhere; where it leaves much, beside all
-    these but what changes.
+    these but what changes. With two offsets in the place of a free trim, where that is likelier.
     """
     names = _what_may_lead(fitter, best)
     if fitter.excess(best.fit) < LOST:
