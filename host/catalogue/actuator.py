@@ -7,7 +7,7 @@ from host.dynamics.equations import Chain, Effect, Parameter
 
 SLIGHT = 1e-12  # share of a sub-step, so that no part of it is empty
 LEAST_MOVED = 1e-9  # rad, of a servo that moves
-AT_REST = 1e-4  # rad: by less a plane moves in a sub-step as if it stood, to a hundredth of that
+AT_REST = 1e-4  # rad: a plane that moves less in a sub-step counts as standing at its mean
 NEVER = 1e-9  # of lift that does not fall: so far off it would keep a share
 
 

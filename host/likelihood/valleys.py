@@ -37,7 +37,7 @@ USUAL_SPEED, SPEED_FACTOR = 1.5, 3.0  # m/s; gliders make 0.3, torpedoes 10
 USUAL_DAMPING, DAMPING_FACTOR = -1.0, 5.0  # 1/s, of a1; gliders 0.1, small quick hulls 6
 # 1/s, of a1: a model that lacks an effect may follow its plane at once, or hardly at all.
 INSTANT, IDLE = -10.0, -0.1
-UNDAMPED = -1e-3  # 1/s, of a2
+UNDAMPED = -1e-3  # 1/s, of a1 or a2: at its bound, or next to it
 STANDING = 0.1  # m/s: no plane works at less
 A1, A2, A3, B1, B2, U0 = (NAMES.index(name) for name in ("a1", "a2", "a3", "b1", "b2", "u0"))
 LAGS, DEPTH_LAG, MUNK, COUPLING = ("lag_time", "pitch_lag_time"), "depth_lag_time", "c_qw", "c_wq"

@@ -9,13 +9,12 @@ own.
 
 import numpy as np
 
-from host.catalogue.kin import OFFSETS, as_trim
+from host.catalogue.kin import OFFSETS, as_trim, is_time
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.recordings.recording import Recording
 
 LEAST_ANGLE = 5e-5  # rad, 0.003 deg: of plane, or of the climb that is due to a force
 SHORT, SHORTEST = 0.25, 0.05  # of the time between rows, and s: commands of 20 Hz are late by half of that
-TIMES = {"actuator_lag": "lag_time", "actuator_delay": "delay"}
 
 
 def minute_in(explanation: Explanation) -> Names:
@@ -42,4 +41,5 @@ def unresolved_in(explanation: Explanation, recordings: list[Recording]) -> Name
     fit = explanation.fit
     known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
     most = min(SHORTEST, SHORT * min(recording.step for recording in recordings))
-    return frozenset(name for name in explanation.names & TIMES.keys() if known[TIMES[name]] < most)
+    late = (effect for effect in fit.structure.effects if effect.slot == "actuator" and is_time(effect))
+    return frozenset(effect.name for effect in late if known[effect.parameters[0].name] < most)

@@ -24,6 +24,7 @@ from host.diagnosis.proof.scoring import Misfit
 from host.diagnosis.search.unknown_physics import known_in, unknown_in
 from host.dynamics.equations import NAMES, PARAMETERS
 from host.identification.uncertainty import safe_inverse
+from host.likelihood.valleys import UNDAMPED
 from host.recordings.recording import Array
 
 Verdict = Literal["no_mismatch", "explained", "partly_explained", "unexplained"]
@@ -57,7 +58,6 @@ HARDLY_TURNED = 0.01  # of the density of the moment that moving water has besid
 STEEPEST, NO_SEA = 0.44, 2.0  # slope of a breaking wave; times that, so that no estimate is off so far
 NEARLY = 1.0 - 1e-6  # of a bound: at it
 DAMPINGS = {"a1": "heave_damping", "a2": "pitch_damping"}
-UNDAMPED = PARAMETERS[NAMES.index("a1")].upper * (2.0 - NEARLY)  # 1/s: at its bound, but for rounding
 SLIGHT_DAMPING = 0.02  # 1/s: an estimate as sure as that tells none from that of a slow hull
 KNOWN = 1.0 / 3.0  # of it, is what a deviation may be there, if to end at a bound is to tell anything
 
