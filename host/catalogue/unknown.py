@@ -33,6 +33,8 @@ SHALLOWEST = {side: f"layers_{side}_top" for side in LAYERED_KIND}
 DEEPEST = {side: f"layers_{side}_bottom" for side in LAYERED_KIND}
 """The parameters that hold the depths, m, between which a force, moment or current goes with the depth."""
 
+NARROW = 0.002  # m/s, rad/s or rad: what dry friction needs to turn about
+
 Term = Callable[[tuple[ca.SX, ...]], ca.SX]
 
 
@@ -117,6 +119,64 @@ def _of_plane(shape: str, term: Term) -> Effect:
 
 def _in_words(shape: str) -> str:
     return shape.replace("abs_", "the size of ").replace("_", " times ")
+
+
+def _directed(side: Side) -> Effect:
+    rate, unit = {"heave": ("w", "m/s"), "pitch": ("q", "rad/s")}[side]
+    own, width = f"dry_{side}", f"dry_{side}_width"
+
+    def force(c: Chain) -> None:
+        x = getattr(c, rate)
+        setattr(c, side, getattr(c, side) + c.p[own] * _direction(x, c.p[width]))
+
+    return Effect(
+        name=f"unknown_{KIND[side]}_by_direction",
+        slot=side,
+        parameters=(_constant(side, own), _width(width, unit)),
+        sentence=f"A {KIND[side]} acts that goes with the direction of {rate} and hardly with its size, as "
+        "dry friction does.",
+        equation=f"{RATE[side]} = ... + {own} {rate}/sqrt({rate}^2 + {width}^2)",
+        manoeuvre="slow and fast steps of the same size",
+        probes=((0.0, NARROW),),
+        sizes=(own,),
+        force=force,
+    )
+
+
+def _dead_plane() -> Effect:
+    def force(c: Chain) -> None:
+        short = c.p["dead_plane"] * _direction(c.plane, c.p["dead_plane_width"])
+        c.heave += c.p["b1"] * short
+        c.pitch += c.p["b2"] * short
+
+    return Effect(
+        name="unknown_plane_by_direction",
+        slot="actuator",
+        parameters=(
+            Parameter(name="dead_plane", unit="rad", lower=-0.5, upper=0.5, meaning="angle, by its sign"),
+            _width("dead_plane_width", "rad"),
+        ),
+        sentence="The plane acts as if it stood further over, or less far, by the same angle to both sides.",
+        equation="w' = ... + b1 s, q' = ... + b2 s, s = dead_plane delta/sqrt(delta^2 + dead_plane_width^2)",
+        manoeuvre="small and large steps of the plane",
+        probes=((0.0, 5.0 * NARROW),),
+        sizes=("dead_plane",),
+        force=force,
+    )
+
+
+def _constant(side: Side, name: str) -> Parameter:
+    return Parameter(name=name, unit=UNIT[side], lower=-MOST[side], upper=MOST[side], meaning="its size")
+
+
+def _width(name: str, unit: str) -> Parameter:
+    return Parameter(
+        name=name, unit=unit, lower=0.2 * NARROW, upper=25.0 * NARROW, meaning="where it gives way"
+    )
+
+
+def _direction(x: ca.SX, width: ca.SX) -> ca.SX:
+    return x / ca.sqrt(x**2 + width**2)
 
 
 def _any_smooth_force(c: Chain) -> None:
@@ -233,6 +293,10 @@ WANDERING = frozenset(f"unknown_wandering_{kind}" for kind in KIND.values())
 """Of so many terms in time that any slow motion can be followed with them."""
 
 
+_DIRECTED = (_directed("heave"), _directed("pitch"), _dead_plane())
+DIRECTED = tuple(form.name for form in _DIRECTED)
+"""Forms that bend the base, and all that every vehicle has, until they no longer promise anything."""
+
 _LAYERED = {form.name: form for form in map(_in_layers, LAYERED_KIND)}
 IN_LAYERS = frozenset(_LAYERED)
 """Asked only of a vehicle that dives: over less, anything goes with the depth."""
@@ -255,6 +319,7 @@ def over_depth(name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
 FORMS: tuple[Effect, ...] = (
     *(_of_motion(side, shape, term) for side in SIDES for shape, term in SHAPES.items()),
     *(_of_plane(shape, term) for shape, term in PLANE_SHAPES.items()),
+    *_DIRECTED,
     *(_wandering(side) for side in SIDES),
     SWINGING_MOMENT,
     *_LAYERED.values(),

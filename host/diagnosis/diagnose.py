@@ -14,6 +14,7 @@ from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.leftover import Leftover
 from host.diagnosis.fits.margins import NAMING_MARGIN
+from host.diagnosis.fits.patience import is_over, was_cut
 from host.diagnosis.fits.sea_fits import WAVES, again_in_waves, again_under_forces, with_regular_waves
 from host.diagnosis.fits.workers import Workers, sharing
 from host.diagnosis.plane_choice import Way, is_likelier, likelier_first, ways
@@ -43,6 +44,7 @@ from host.recordings.recording import Array, Recording
 
 HORIZON = 5.0  # s
 MOST_WORTH = 1e9  # of BIC: without some effects the equations run away
+CUT_SHORT = "The search was ended before it had asked all that it might: --minutes lets it go on for longer."
 Ranking = list[tuple[str, float]]
 SLOTS: tuple[Slot, ...] = ("heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment")
 
@@ -154,7 +156,7 @@ def _diagnosed(
         on_progress("an excerpt")
     with Workers(fitter, jobs) as workers:
         explained = explain(fitter, workers, on_progress, way, like=like, is_second=is_second)
-        again = next((other for other in others if _is_likelier(other, explained)), None)
+        again = next((way for way in others if not is_over() and _is_likelier(way, explained)), None)
         if again is None and not is_part:
             judged = _judge(explained, spans, floor, on_progress)
     if again is not None:
@@ -215,7 +217,13 @@ def _diagnosed(
         remaining=" ".join(
             filter(
                 None,
-                [_apart(way), told, *_unnamed(best, waves, recordings), *(_other_answers(found) or hardly)],
+                [
+                    _apart(way),
+                    told,
+                    CUT_SHORT * was_cut(),
+                    *_unnamed(best, waves, recordings),
+                    *(_other_answers(found) or hardly),
+                ],
             )
         ),
         has_sea=best.fit.has_process_noise,
@@ -235,8 +243,11 @@ def _apart(way: Way) -> str:
 
 
 def _on_all(verdict: Verdict, way: Way) -> Verdict:
-    """The verdict on all of a recording of which stretches were left out, or a plane known in part."""
-    is_of_part = way.apart or way.is_astray
+    """The verdict on all of a recording of which stretches were left out, or a plane known in part.
+
+    Or where the search had not asked all.
+    """
+    is_of_part = way.apart or way.is_astray or was_cut()
     return "partly_explained" if is_of_part and verdict in ("explained", "no_mismatch") else verdict
 
 

@@ -22,6 +22,7 @@ from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.leftover import leftover
 from host.diagnosis.fits.margins import LARGEST_SET, LITTLE, NAMING_MARGIN
+from host.diagnosis.fits.patience import is_over
 from host.diagnosis.fits.sea_fits import as_filtered
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.plane_choice import Way
@@ -60,6 +61,8 @@ def explain(
     again = [fitter.refitted(one) for one in _found_in(part)] if part else _alike(fitter, like)
     search.outset = way.outset if not again else None
     best, drift = search.run(again), None
+    if is_over():
+        return _so_far(search, best)
     if search.adrift is not None:
         drift = in_drift(search, search.adrift)
         if drift is not None and drift.left.is_nothing:
@@ -72,6 +75,8 @@ def explain(
             search = Search(fitter, workers, on_progress, fitter.base, fitter.root, alone=alone)
             search.is_second = is_second
             best = search.run(again)
+    if is_over():
+        return _so_far(search, best)
     may_be_sea = part is None or part.best.fit.has_process_noise
     if may_be_sea and (led := _led_astray(search, best)) is not None:
         return led
@@ -82,10 +87,17 @@ def explain(
     known = best
     if not way.apart or fitter.excess(best.fit) > LITTLE:  # a turn dies away beyond what was left out of it
         best = _beside_what_is_unknown(search, best)
+    if is_over():
+        return _so_far(search, best)
     if may_be_sea and (unknown_in(best) or not leftover(fitter, best).is_nothing):
         may_swing = part is None or part.waves is not None
         return _in_disturbed_water(search, known, best, plain, drift, may_swing)
     return _leanest(search, best)
+
+
+def _so_far(search: Search, best: Explanation) -> Explained:
+    """What a search has found that ends before it has asked all."""
+    return Explained(best, search, leftover(search.fitter, best), None)
 
 
 def _of_a_part(
@@ -194,6 +206,8 @@ def _in_disturbed_water(
         return swung
     calm = best
     search, best = in_a_sea(search, best)
+    if is_over():
+        return _so_far(search, best)
     if swung is not None and explains_more(swung, best):
         return swung
     if may_swing:

@@ -10,6 +10,7 @@ from host.diagnosis.disturbances.plain_waves import plain_waves, whole_in_waves
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN, margin
+from host.diagnosis.fits.patience import is_over
 from host.diagnosis.fits.sea_fits import as_filtered, with_sea, with_waves
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.plane_astray import astray_share, whole_astray
@@ -97,15 +98,17 @@ def likelier_first(
     if whole is not None and says_all(leading.fitter, whole):
         return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
     one = None if whole is None else one_that_says_all(leading.fitter, whole, jobs)
-    if whole is not None and one is None:
+    if whole is not None and one is None and not is_over():
         told, whole = _at_speeds_or_in_short_runs([leading, *others], whole, on_progress, jobs, may_leave_out)
         if told:
             return told
     if whole is not None:
-        whole = one or beside_what_leads(leading.fitter, whole, jobs)
+        whole = one or (whole if is_over() else beside_what_leads(leading.fitter, whole, jobs))
     if seen := _among_waves(found):
         on_progress("what every vehicle has, in the waves")
         return _in_a_swell(seen, whole)
+    if whole is not None and is_over():
+        return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
     if whole is not None and (astray := _astray([leading, *others], whole, on_progress)):
         return astray
     if may_leave_out and whole is not None and leading.fitter.excess(whole.fit) > BENT:
@@ -113,7 +116,7 @@ def likelier_first(
         short = short_runs(leading.recordings, whole)
         if short is not None and (apart := stretches_apart(short, jobs, as_most_tell=True).spans):
             return _without(leading, apart, on_progress, jobs)
-    if whole is not None:
+    if whole is not None and not is_over():
         filtered = partial(led_by_a_filter, whole=whole)
         if led := _led([leading, *others], whole, filtered, on_progress, jobs):
             return led

@@ -4,10 +4,13 @@ import argparse
 import os
 import sys
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 
 from host.recordings.recording import Recording
 from tools.bench import add_leave_out, load_vehicle, progress, read_all, require_bench, tell_notes
+
+MINUTES, MINUTES_IF_LONG, LONG = 4.0, 8.0, 10_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,6 +47,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="where diagnosis.json, extended_model.json and report.html go",
     )
+    parser.add_argument(
+        "--minutes",
+        type=float,
+        metavar="N",
+        help="after so long no stage of the search begins; the rest takes about a minute "
+        f"(default: {MINUTES:g}, with more than {LONG} rows {MINUTES_IF_LONG:g}; 0: no limit)",
+    )
     parser.add_argument("--jobs", type=int, metavar="N", help="fits at once (default: all cores, at most 8)")
     parser.add_argument("--quiet", action="store_true", help="no progress")
 
@@ -52,6 +62,9 @@ def run(args: argparse.Namespace) -> int:
     """0 when the answer is known (nothing missing, or explained); 1 when it is not, or only in part."""
     if args.jobs is not None and args.jobs < 1:
         print("mils: --jobs must be at least 1", file=sys.stderr)
+        return 2
+    if args.minutes is not None and not args.minutes >= 0.0:
+        print("mils: --minutes must not be negative", file=sys.stderr)
         return 2
     for option in ("around", "leave_out"):
         if getattr(args, option) not in (None, "") and args.simulation is not None:
@@ -78,6 +91,7 @@ def run(args: argparse.Namespace) -> int:
         from host.diagnosis.against.given_simulation import against_simulation, check_same_flight
         from host.diagnosis.answer import Answer
         from host.diagnosis.diagnose import diagnose
+        from host.diagnosis.fits.patience import patience
         from host.diagnosis.proof.deviations import interval
         from host.diagnosis.separation import separations
         from host.diagnosis.told.files import write_diagnosis, write_extended_model
@@ -89,12 +103,15 @@ def run(args: argparse.Namespace) -> int:
             check_same_flight(recordings, simulated)
         # What a simulation is set against is taken whole: its rows are those of the recording.
         may_leave_out = args.simulation is None
-        answer = Answer(found=diagnose(recordings, say, jobs, may_leave_out=may_leave_out))
+        limit = _seconds(recordings, args.minutes)
+        with patience(limit):
+            answer = Answer(found=diagnose(recordings, say, jobs, may_leave_out=may_leave_out))
         if model is not None:
             say("against the model")
             answer = against_model(answer.found, model, args.model.name)
         if simulated:
-            answer = against_simulation(answer.found, simulated, say, jobs)
+            with patience(limit):
+                answer = against_simulation(answer.found, simulated, say, jobs)
         answer = replace(answer, separations=separations(answer.found, say))
         found = answer.found
         args.out.mkdir(parents=True, exist_ok=True)
@@ -121,6 +138,14 @@ def run(args: argparse.Namespace) -> int:
     print(f"  {found.remaining}")
     print(f"report: {args.out / 'report.html'}")
     return 0 if found.verdict in ("no_mismatch", "explained") else 1
+
+
+def _seconds(recordings: list[Recording], minutes: float | None) -> float:
+    """How long stages of the search may begin."""
+    if minutes is None:
+        rows = sum(recording.time.size for recording in recordings)
+        minutes = MINUTES_IF_LONG if rows > LONG else MINUTES
+    return 60.0 * minutes or inf
 
 
 def _part(recordings: list[Recording], args: argparse.Namespace) -> list[Recording]:

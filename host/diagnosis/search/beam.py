@@ -13,6 +13,7 @@ from host.catalogue.nuisance import FREE_TRIM
 from host.catalogue.unknown import WANDERING
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.margins import FEW, LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN, SMALL, margin
+from host.diagnosis.fits.patience import is_over
 from host.diagnosis.fits.workers import Task
 from host.diagnosis.search.candidates import candidates, eligible
 from host.diagnosis.search.lone_form import lone_form
@@ -34,6 +35,8 @@ def beam_search(search: "Search") -> None:
     beam = [search.remember(search.root)]
     foreign, leading, enough, postponed = None, search.root, None, None
     for size in range(1, LARGEST_SET + 1):
+        if size > 1 and is_over():
+            return
         if size == 2 and _needs_many(search, beam[0], size):
             beam = _with_best_pair(search, beam)
         if foreign is None and _needs_many(search, beam[0], size):
@@ -72,7 +75,7 @@ def beam_search(search: "Search") -> None:
                     if search.fitter.excess(leading.fit) > MUCH:
                         break
                     foreign = None  # one effect more may do as well as all these
-    if postponed is not None and _leave_something(search) and not search.instead():
+    if postponed is not None and not is_over() and _leave_something(search) and not search.instead():
         together(search, leading, postponed)
 
 

@@ -20,6 +20,7 @@ from host.catalogue import ALONG_THE_HULL, named, structure_of
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.first_guess import first_guess
 from host.diagnosis.fits.margins import LITTLE, NAMING_MARGIN
+from host.diagnosis.fits.patience import is_over
 from host.diagnosis.fits.prospects import gain, probed
 from host.diagnosis.fits.starts import idle_values, with_other_moments
 from host.diagnosis.search.candidates import candidates
@@ -58,7 +59,7 @@ def continued(
 ) -> Explanation | None:
     """The set beside a bias and a current, with drag along the hull or not, and at most so many effects more.
 
-    None where the filter loses the recording.
+    None where the filter loses the recording, or where it takes too long.
 
     known  values with which parameters of its effects begin
     """
@@ -84,7 +85,7 @@ def continued(
                 break
             most, most_lost = LITTLE, NAMING_MARGIN
             followed = [*_moved(search, larger), *followed][:FOLLOWED]
-        if not followed:
+        if not followed or is_over():
             return None
         least = min(least, followed[0].bic)
         likeliest = _kept(search, followed)

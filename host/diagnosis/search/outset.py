@@ -18,7 +18,7 @@ from host.catalogue import ALONG_THE_HULL, DRIVE, FAINT, NEAR_THE_SURFACE, ORDIN
 from host.catalogue.kin import OFFSETS
 from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
-from host.catalogue.unknown import IN_LAYERS, WANDERING
+from host.catalogue.unknown import DIRECTED, IN_LAYERS, WANDERING
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import ROUGHLY, Fitter
 from host.diagnosis.fits.margins import LITTLE, MUCH, ROUGH, margin
@@ -93,20 +93,23 @@ def one_that_says_all(fitter: Fitter, whole: Explanation, jobs: int) -> Explanat
     """The likeliest of what may lead, alone, if it leaves nothing: no turn is explained so, but by a form.
 
     What keeps the plane back also where all that every vehicle has does most of its work: but for a little,
-    which random forces would explain.
+    which random forces would explain. And of the forms what has a direction and no size, as dry friction, for
+    which many may stand: no turn goes with the motion so.
     """
     left = fitter.excess(whole.fit)
     if left < LITTLE:
         return None
-    alone = _each_alone(fitter, (*SCANS, *DRIVE, *IN_TIME) if left > MUCH else DRIVE, jobs)
+    likely = (*DRIVE, *DIRECTED)
+    alone = _each_alone(fitter, (*SCANS, *likely, *IN_TIME) if left > MUCH else likely, jobs)
     best = min(alone, key=lambda e: e.bic)
-    is_all = says_all(fitter, best) and best.names.isdisjoint(UNKNOWN) and best.bic < whole.bic
-    return best if is_all else None
+    is_told = best.names.isdisjoint(UNKNOWN.keys() - {*DIRECTED})
+    return best if is_told and says_all(fitter, best) and best.bic < whole.bic else None
 
 
 def _what_may_lead(fitter: Fitter, whole: Explanation) -> tuple[str, ...]:
     is_lost = fitter.excess(whole.fit) > LOST
-    return (*SCANS, *DRIVE, *IN_TIME) if is_lost else (*DRIVE, *IN_TIME)
+    likely = (*DRIVE, *DIRECTED, *IN_TIME)
+    return (*SCANS, *likely) if is_lost else likely
 
 
 def _each_alone(fitter: Fitter, names: Iterable[str], jobs: int) -> list[Explanation]:

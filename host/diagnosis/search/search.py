@@ -17,6 +17,7 @@ from host.diagnosis.fits.absence import promises_more
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LARGEST_SET, MUCH, ROUGH, SMALL
+from host.diagnosis.fits.patience import is_over
 from host.diagnosis.fits.prospects import gain
 from host.diagnosis.fits.workers import Task, Workers
 from host.diagnosis.search.beam import beam_search, grown
@@ -126,6 +127,8 @@ class Search:
         """The best set with offsets in the place of its free trim, settled, and what only then shows."""
         self.on_progress("settling")
         found = self._settled(with_best_offsets(self))
+        if is_over():
+            return found
         best = with_one_offset(self, told_by_the_usual(self, whole(self, completed(self, found))))
         return with_offsets_asked_again(self, best, best is not found)
 
@@ -269,6 +272,8 @@ class Search:
         settled: Names = frozenset()
         for _ in range(MOST_ROUNDS):
             best = pruned(self, best)
+            if is_over():
+                break
             if len(best.names) > LARGEST_SET and (self.part is not None or self.is_hopeless(best)):
                 break  # exchanged there, or not worth the time
             rival = exchanged(self, best, settled)

@@ -17,6 +17,7 @@ from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.leftover import is_above_floor
 from host.diagnosis.fits.margins import FEW, LITTLE, MUCH, SMALL, margin
+from host.diagnosis.fits.patience import is_over
 from host.diagnosis.fits.starts import is_far
 from host.diagnosis.fits.trims import retrimmed
 from host.diagnosis.fits.workers import Task, Workers
@@ -77,7 +78,7 @@ def together(search: "Search", leading: Explanation, joint: Explanation) -> Expl
         search.on_progress("sensors that wander, gusts")
         search.adrift = plain_drift(fitter, best)
     left = fitter.excess(best.fit)
-    may_be_led = left < MUCH or not search.is_second
+    may_be_led = (left < MUCH or not search.is_second) and not is_over()
     if left > LITTLE and may_be_led and (end := _by_continuation(search, left)) is not None:
         # What drifts can make up for a hull in another valley than the truth.
         if fitter.excess(end.fit) < LITTLE:

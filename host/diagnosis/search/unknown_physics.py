@@ -12,6 +12,7 @@ from host.catalogue import BY_NAME, UNKNOWN
 from host.catalogue.unknown import IN_LAYERS, over_depth
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.margins import FEW, LARGEST_SET, LITTLE, NAMING_MARGIN, SMALL, margin
+from host.diagnosis.fits.patience import is_over
 from host.diagnosis.fits.prospects import form_gains
 from host.diagnosis.search.exchange import exchanged
 from host.diagnosis.search.lone_form import FAIR_PART, PROMISING, likely_forms
@@ -30,6 +31,8 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
     search.on_progress("physics outside the catalogue")
     settled = best.names
     for _ in range(_rounds(search, best)):
+        if is_over():
+            break
         grown = _grown(search, best)
         # Of a large set each member costs a long fit to try without: that waits until all have joined.
         leaner = grown if _is_large(best) else (pruned(search, e) for e in grown)
@@ -42,7 +45,7 @@ def with_unknown(search: Search, best: Explanation) -> Explanation:
     if not _is_large(best):
         return best
     best = pruned(search, best)
-    if search.part is not None or search.is_hopeless(best) or _is_left_open(search, best):
+    if is_over() or search.part is not None or search.is_hopeless(best) or _is_left_open(search, best):
         return best
     best = completed(search, best)
     return best if _forms_in(best) else exchanged(search, best, settled)

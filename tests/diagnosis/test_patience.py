@@ -1,0 +1,37 @@
+"""A search that is to end early, and what it then says."""
+
+from hidden_dive import hidden_dive
+
+from host.diagnosis.diagnose import CUT_SHORT, diagnose
+from host.diagnosis.fits.patience import is_over, patience, was_cut
+
+
+def test_there_is_no_limit_unless_one_is_set() -> None:
+    assert not is_over()
+    with patience(3600.0):
+        assert not is_over()
+    with patience(0.0):
+        assert is_over()
+    assert not was_cut()
+
+
+def test_a_limit_within_a_limit_leaves_the_outer_one_as_it_was() -> None:
+    with patience(3600.0):
+        with patience(0.0):
+            assert is_over()
+        assert not is_over()
+
+
+def test_a_search_is_cut_only_where_something_was_to_be_asked_later() -> None:
+    with patience(0.0):
+        assert not was_cut()
+        assert is_over()
+        assert was_cut()
+
+
+def test_a_search_without_time_answers_with_what_one_effect_tells_and_says_so() -> None:
+    with patience(0.0):
+        found = diagnose([hidden_dive(lambda _, x, __: (0.8 * x[1], 0.0, 0.0), seed=1)])
+    assert found.verdict == "partly_explained"
+    assert CUT_SHORT in found.remaining
+    assert [effect.name for effect in found.effects] == ["heave_pitch_rate_coupling"]
