@@ -19,6 +19,7 @@ from host.diagnosis.search.candidates import candidates, eligible
 from host.diagnosis.search.lone_form import lone_form
 from host.diagnosis.search.offset_choice import with_offset
 from host.diagnosis.search.together import at_once, together
+from host.likelihood.valleys import has_usual_heave
 
 if TYPE_CHECKING:
     from host.diagnosis.search.search import Search
@@ -175,13 +176,14 @@ def _promising(search: "Search", parent: Explanation, size: int, is_leading: boo
 
     The prediction is local. A base bent far from the truth hides what the common effects, which trade
     against its own coefficients, would gain once all of them are free; so until little is left these
-    are always tried, unless all at once.
+    are always tried, unless all at once. Of a base whose heave is none of a hull, twice as many.
     """
     others = candidates(search, parent)
     if size == 1 and not search.root.fit.has_process_noise:
         return others
     gains = search.gains(parent, is_leading)
-    best = sorted(gains, key=lambda name: -gains[name])[: PROMISING if size == 2 else FEW]
+    many = PROMISING if has_usual_heave(parent.fit.end) else 2 * PROMISING
+    best = sorted(gains, key=lambda name: -gains[name])[: many if size == 2 else FEW]
     worth = {name for name in best if gains[name] > NAMING_MARGIN}
     is_far = size <= 2 and search.fitter.excess(parent.fit) > LITTLE
     # What every vehicle has was tried at once and leads nowhere, if it was.
