@@ -293,8 +293,25 @@ WANDERING = frozenset(f"unknown_wandering_{kind}" for kind in KIND.values())
 """Of so many terms in time that any slow motion can be followed with them."""
 
 
-_DIRECTED = (_directed("heave"), _directed("pitch"), _dead_plane())
-DIRECTED = tuple(form.name for form in _DIRECTED)
+def _hardening(c: Chain) -> None:
+    c.pitch -= c.p["hardening"] * c.theta**3
+
+
+HARDENING = Effect(
+    name="unknown_hardening_moment",
+    slot="pitch",
+    parameters=(
+        Parameter(name="hardening", unit="rad/s^2/rad^3", lower=0.0, upper=1e3, meaning="of the cube"),
+    ),
+    sentence="A moment rights the hull that grows faster than its pitch, where that of a weight falls behind.",
+    equation="q' = ... - hardening theta^3",
+    manoeuvre="small and large steps of the plane",
+    probes=((0.0,),),
+    force=_hardening,
+)
+
+_LEADING = (_directed("heave"), _directed("pitch"), _dead_plane(), HARDENING)
+LEADING_FORMS = (*(form.name for form in _LEADING), "unknown_plane_abs_delta")
 """Forms that bend the base, and all that every vehicle has, until they no longer promise anything."""
 
 _LAYERED = {form.name: form for form in map(_in_layers, LAYERED_KIND)}
@@ -319,7 +336,7 @@ def over_depth(name: str, values: Mapping[str, float]) -> tuple[Array, Array]:
 FORMS: tuple[Effect, ...] = (
     *(_of_motion(side, shape, term) for side in SIDES for shape, term in SHAPES.items()),
     *(_of_plane(shape, term) for shape, term in PLANE_SHAPES.items()),
-    *_DIRECTED,
+    *_LEADING,
     *(_wandering(side) for side in SIDES),
     SWINGING_MOMENT,
     *_LAYERED.values(),

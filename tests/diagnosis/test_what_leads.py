@@ -10,7 +10,7 @@ import pytest
 from host.catalogue import DRIVE, ORDINARY
 from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
-from host.catalogue.unknown import DIRECTED
+from host.catalogue.unknown import LEADING_FORMS
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LITTLE, MUCH
@@ -157,11 +157,11 @@ def test_one_effect_that_leaves_nothing_is_found_before_stretches_are_left_out(
     assert (found is not None and leads in found.names) == says_all
     monkeypatch.setattr(outset, "all_beside", lambda _, one: one)
     monkeypatch.setattr(outset, "_by_fewer", lambda *a: a[2])
-    outset._beside_what_leads(real, real.root, (*DRIVE, *DIRECTED, *IN_TIME), 1)
-    assert asked == [*SCANS, *DRIVE, *DIRECTED, *IN_TIME]  # each fitted once
+    outset._beside_what_leads(real, real.root, (*DRIVE, *LEADING_FORMS, *IN_TIME), 1)
+    assert asked == [*SCANS, *DRIVE, *LEADING_FORMS, *IN_TIME]  # each fitted once
 
 
-@pytest.mark.parametrize(("left", "asked"), [(LITTLE - 0.1, []), (LITTLE + 0.1, [*DRIVE, *DIRECTED])])
+@pytest.mark.parametrize(("left", "asked"), [(LITTLE - 0.1, []), (LITTLE + 0.1, [*DRIVE, *LEADING_FORMS])])
 def test_where_little_is_left_it_may_be_a_fault_of_the_drive_before_it_is_random_forces(
     left: float, asked: list[str], real: Fitter, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -192,7 +192,9 @@ def test_no_hull_that_hardly_heaves_is_enough_beside_forces(
     assert outset.is_enough_beside(search, sea, sea) == is_enough
 
 
-@pytest.mark.parametrize(("left", "asked"), [(MUCH - 0.1, []), (MUCH + 0.1, [(*DRIVE, *DIRECTED, *IN_TIME)])])
+@pytest.mark.parametrize(
+    ("left", "asked"), [(MUCH - 0.1, []), (MUCH + 0.1, [(*DRIVE, *LEADING_FORMS, *IN_TIME)])]
+)
 def test_what_keeps_the_plane_back_is_asked_where_much_is_left(
     left: float, asked: list[tuple[str, ...]], real: Fitter, monkeypatch: pytest.MonkeyPatch
 ) -> None:

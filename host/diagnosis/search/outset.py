@@ -18,7 +18,7 @@ from host.catalogue import ALONG_THE_HULL, DRIVE, FAINT, NEAR_THE_SURFACE, ORDIN
 from host.catalogue.kin import OFFSETS
 from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
-from host.catalogue.unknown import DIRECTED, IN_LAYERS, WANDERING
+from host.catalogue.unknown import IN_LAYERS, LEADING_FORMS, WANDERING
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import ROUGHLY, Fitter
 from host.diagnosis.fits.margins import LITTLE, MUCH, ROUGH, margin
@@ -93,22 +93,22 @@ def one_that_says_all(fitter: Fitter, whole: Explanation, jobs: int) -> Explanat
     """The likeliest of what may lead, alone, if it leaves nothing: no turn is explained so, but by a form.
 
     What keeps the plane back also where all that every vehicle has does most of its work: but for a little,
-    which random forces would explain. And of the forms what has a direction and no size, as dry friction, for
-    which many may stand: no turn goes with the motion so.
+    which random forces would explain. And forms that go with the motion as no turn does, dry friction, say,
+    for which many entries may stand.
     """
     left = fitter.excess(whole.fit)
     if left < LITTLE:
         return None
-    likely = (*DRIVE, *DIRECTED)
+    likely = (*DRIVE, *LEADING_FORMS)
     alone = _each_alone(fitter, (*SCANS, *likely, *IN_TIME) if left > MUCH else likely, jobs)
     best = min(alone, key=lambda e: e.bic)
-    is_told = best.names.isdisjoint(UNKNOWN.keys() - {*DIRECTED})
+    is_told = best.names.isdisjoint(UNKNOWN.keys() - {*LEADING_FORMS})
     return best if is_told and says_all(fitter, best) and best.bic < whole.bic else None
 
 
 def _what_may_lead(fitter: Fitter, whole: Explanation) -> tuple[str, ...]:
     is_lost = fitter.excess(whole.fit) > LOST
-    likely = (*DRIVE, *DIRECTED, *IN_TIME)
+    likely = (*DRIVE, *LEADING_FORMS, *IN_TIME)
     return (*SCANS, *likely) if is_lost else likely
 
 
