@@ -303,7 +303,7 @@ HARDENING = Effect(
     parameters=(
         Parameter(name="hardening", unit="rad/s^2/rad^3", lower=0.0, upper=1e3, meaning="of the cube"),
     ),
-    sentence="A moment rights the hull that grows faster than its pitch, where that of a weight falls behind.",
+    sentence="A moment rights the hull that grows faster than its pitch; that of a weight falls behind.",
     equation="q' = ... - hardening theta^3",
     manoeuvre="small and large steps of the plane",
     probes=((0.0,),),

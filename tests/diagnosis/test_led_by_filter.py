@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hidden_dive import hidden_dive
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.workers import Workers
+from host.diagnosis.search import led_by_filter
 from host.diagnosis.search.led_by_filter import led_by_a_filter
 from host.diagnosis.search.outset import LOST, ends_of, names_of_all
 from host.diagnosis.search.search import Search
@@ -77,3 +79,58 @@ def test_what_keeps_its_plane_back_gains_beside_the_forces() -> None:
 def test_a_hull_that_a_free_run_follows_needs_no_filter() -> None:
     fitter = Fitter([hidden_dive(duration=40.0)])
     assert led(fitter, fitter.root) is None
+
+
+class Stub:
+    """A search whose sets gain what is told, one after the other."""
+
+    def __init__(self, *gains: dict[str, float]) -> None:
+        self._gains, self.workers, self.fitter = list(gains), self, None
+
+    def gains(self, _: Explanation) -> dict[str, float]:
+        return self._gains.pop(0)
+
+    def growth(self, parent: Explanation, name: str) -> Explanation:
+        return replace(parent, names=parent.names | {name}, bic=parent.bic - 1000.0)
+
+    def results(self, tasks: list[Explanation]) -> list[Explanation]:
+        return tasks
+
+
+@pytest.mark.parametrize(
+    ("gains", "form", "joined"),
+    [
+        ([{"actuator_delay": 1.0}], 0.0, set()),
+        ([{"actuator_delay": 900.0}, {"ballast_change": 1.0}], 0.0, {"actuator_delay"}),
+        ([{"actuator_delay": 900.0}], 950.0, None),  # a form promises more
+        ([{"actuator_delay": 900.0}, {"ballast_change": 900.0}, {"internal_wave": 900.0}], 0.0, None),
+    ],
+)
+def test_what_gains_beside_the_forces_joins_unless_it_is_too_much_or_of_no_catalogue(
+    gains: list[dict[str, float]], form: float, joined: set[str] | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(led_by_filter, "form_gains", lambda *_: {"unknown_force_w_w": form})
+    monkeypatch.setattr(led_by_filter, "_among_look_alikes", lambda _, sea: sea)
+    sea: Any = Explanation(frozenset(), begun(np.inf)[0].root.fit, 0.0)
+    search: Any = Stub(*gains)
+    found = led_by_filter._with_what_gains(search, sea)
+    assert (None if found is None else {*found.names}) == joined
+
+
+@pytest.mark.parametrize(
+    ("left", "away", "is_led"), [(2.0, True, True), (3.1, True, False), (1.0, False, False)]
+)
+def test_a_logger_that_reads_between_readings_is_led_as_well_but_none_that_a_free_run_follows(
+    left: float, away: bool, is_led: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitter, whole = begun(np.inf)
+    hull = fitter.root.fit.parameters.copy()
+    hull[[0, 1]] = -1.0
+    sea = Explanation(fitter.root.names, replace(fitter.root.fit, parameters=hull), whole.bic - 1e6)
+    excess = lambda fit: left if fit is sea.fit else LOST + 1.0  # noqa: E731
+    monkeypatch.setattr(fitter, "excess", excess)
+    monkeypatch.setattr(led_by_filter, "_continued", lambda _: sea)
+    monkeypatch.setattr(led_by_filter, "_among_look_alikes", lambda _, one: one)
+    monkeypatch.setattr(led_by_filter, "_with_what_gains", lambda _, one: one)
+    monkeypatch.setattr(led_by_filter, "_do_the_same", lambda *_: away)
+    assert (led(fitter, whole) is sea) == is_led
