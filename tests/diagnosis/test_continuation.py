@@ -23,6 +23,7 @@ NAMES = frozenset({*ORDINARY, FREE_TRIM.name})
 BEGUN = NAMES | {"pitch_bias", "vertical_current"}
 WEAKENED_AT, WEAKENED_BY = 70.0, 0.4
 HALF_LENGTH = 0.8  # m
+NOTHING_LEFT = 1.2  # times a noise floor which, told from these 900 rows, is a fifth low in pitch
 Hull = dict[str, float]
 # Its heave turns it broadside (Munk) faster than its weight rights it, and drag alone holds it.
 SHORT = {
@@ -128,7 +129,7 @@ def test_where_nothing_else_acts_nothing_joins() -> None:
         found = continued(search_of(workers, fitter), NAMES, most_beside=3)
     assert found is not None
     assert found.names == BEGUN
-    assert fitter.excess(fitter.polished(found).fit) < 1.15
+    assert fitter.excess(fitter.polished(found).fit) < NOTHING_LEFT
 
 
 # Of the shorter one the first end lies in a side valley.
@@ -142,7 +143,7 @@ def test_a_long_hull_that_meets_the_water_differently_at_either_end(rows: int) -
     assert found.names == BEGUN | {"drag_along_the_hull"}
     found = fitter.polished(found)
     values = dict(zip(found.fit.structure.names, found.fit.parameters, strict=True))
-    assert fitter.excess(found.fit) < 1.15
+    assert fitter.excess(found.fit) < NOTHING_LEFT
     assert values["drag_half_length"] == pytest.approx(HALF_LENGTH, rel=0.15)
 
 
@@ -195,7 +196,7 @@ def test_a_current_joins_beside_the_free_trim_that_cannot_do_its_work() -> None:
         found = continued(search_of(workers, fitter), NAMES, most_beside=3)
     assert found is not None
     assert found.names & {"vertical_current", "pitch_bias"}
-    assert fitter.excess(fitter.polished(found).fit) < 1.15
+    assert fitter.excess(fitter.polished(found).fit) < NOTHING_LEFT
 
 
 def test_what_is_lacking_is_asked_where_fewer_forces_are_less_likely(monkeypatch: pytest.MonkeyPatch) -> None:
