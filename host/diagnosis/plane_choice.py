@@ -5,7 +5,10 @@ from functools import partial
 from math import inf
 from typing import NamedTuple
 
+from host.catalogue import DRIVE
+from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
+from host.catalogue.unknown import LEADING_FORMS
 from host.diagnosis.disturbances.plain_waves import plain_waves, whole_in_waves
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
@@ -102,6 +105,7 @@ def likelier_first(
         told, whole = _at_speeds_or_in_short_runs([leading, *others], whole, on_progress, jobs, may_leave_out)
         if told:
             return told
+    plain = whole
     if whole is not None:
         whole = one or (whole if is_over() else beside_what_leads(leading.fitter, whole, jobs))
     if seen := _among_waves(found):
@@ -116,8 +120,10 @@ def likelier_first(
         short = short_runs(leading.recordings, whole)
         if short is not None and (apart := stretches_apart(short, jobs, as_most_tell=True).spans):
             return _without(leading, apart, on_progress, jobs)
-    if whole is not None and not is_over():
-        filtered = partial(led_by_a_filter, whole=whole)
+    if plain is not None and whole is not None and not is_over():
+        # What goes with time or depth may follow what water does at random: then it leads nowhere.
+        hull = plain if whole.names.isdisjoint({*SCANS, *DRIVE, *LEADING_FORMS}) else whole
+        filtered = partial(led_by_a_filter, whole=hull, free=whole)
         if led := _led([leading, *others], whole, filtered, on_progress, jobs):
             return led
     begun, leads = [leading, *others], whole is not None and leads_on(leading.fitter, whole)

@@ -4,10 +4,11 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hidden_dive import hidden_dive
 
 from host.diagnosis.fits.fitter import Fitter
-from host.diagnosis.fits.leftover import is_above_floor, leftover
+from host.diagnosis.fits.leftover import _is_local, is_above_floor, leftover
 
 
 def test_the_right_model_leaves_nothing_where_all_readings_are_rounded() -> None:
@@ -26,3 +27,14 @@ def test_more_than_the_sensors_show_is_told_of_a_set_that_keeps_no_innovations()
     lean = fitter.base.lean().fit
     assert not is_above_floor(fitter, lean)
     assert is_above_floor(fitter, replace(lean, noise=2.0 * lean.noise))
+
+
+@pytest.mark.parametrize("is_larger", [False, True])
+def test_what_an_autopilot_answers_is_no_error_of_one_range_of_the_plane(is_larger: bool) -> None:
+    rng, dive = np.random.default_rng(0), hidden_dive(duration=90.0)
+    errors = rng.standard_normal((2, dive.time.size))
+    held = 0.3 * dive.rudder
+    if is_larger:  # where the plane stood far over in the row before
+        errors[:, 1:] *= 1.0 + (np.abs(held[:-1]) > 0.05)
+    answering = replace(dive, rudder=held + 0.05 * errors.mean(axis=0))
+    assert _is_local([answering], [errors]) == is_larger

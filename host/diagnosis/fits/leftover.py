@@ -4,7 +4,6 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 from scipy.stats import chi2
 
 from host.catalogue.unknown import ANY_SMOOTH_FORCE
@@ -109,6 +108,11 @@ def _heave_by_sea(fit: Fit) -> float:
     return float(np.sqrt(fit.noise[2] / (2.0 * abs(a1))))
 
 
+def _before(values: Array, rows: int) -> Array:
+    """The values (N,) so many rows before; at first the first."""
+    return np.concatenate([np.full(min(rows, values.size), values[0]), values[:-rows]])
+
+
 def _is_local(recordings: list[Recording], innovations: list[Array]) -> bool:
     """Whether the squared innovations differ between tenths of plane angle or plane movement.
 
@@ -117,13 +121,16 @@ def _is_local(recordings: list[Recording], innovations: list[Array]) -> bool:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # rows without any measurement
         squares = np.concatenate([np.nanmean(np.atleast_2d(e**2), axis=0) for e in innovations])
-    moved = [np.abs(np.gradient(gaussian_filter1d(r.rudder, MOVEMENT_SPAN / r.step))) for r in recordings]
+    stood = [_before(r.rudder, 1) for r in recordings]
+    spans = [max(1, round(MOVEMENT_SPAN / r.step)) for r in recordings]
+    moved = [np.abs(one - _before(one, rows)) for one, rows in zip(stood, spans, strict=True)]
     known = np.isfinite(squares)
     if known.sum() < LEAST_IN_GROUP * GROUPS:
         return False
     values = squares[known]
-    # Not by pitch: a group of measured angles is one of errors, too.
-    for quantity in (np.concatenate([r.rudder for r in recordings]), np.concatenate(moved)):
+    # Not by pitch: a group of measured angles is one of errors, too. Nor by the plane in the very row, where
+    # an autopilot answers these.
+    for quantity in (np.concatenate(stood), np.concatenate(moved)):
         groups = np.array_split(np.argsort(quantity[known], kind="stable"), GROUPS)
         means = np.array([values[group].mean() for group in groups])
         scatter = np.array([values.var() / group.size for group in groups])

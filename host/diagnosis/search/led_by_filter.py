@@ -34,20 +34,22 @@ FORCED = 0.5  # of BIC a sample, by which forces lead a free run away
 MOST_MORE, PROMISING = 2, 2  # effects that join beside the forces, and those that are tried for each
 
 
-def led_by_a_filter(search: "Search", whole: Explanation) -> Explanation | None:
+def led_by_a_filter(
+    search: "Search", whole: Explanation, free: Explanation | None = None
+) -> Explanation | None:
     """All that every vehicle has under the forces beside which it is likeliest, with what gains beside these.
 
     None where a free run comes near, where the forces are large or leave much, and where more gains beside
     them than may join, or a form of unknown physics does: then more acts than a hull. What they leave is no
     white noise where the logger has read its sensors between their readings.
 
-    whole  all that every vehicle has, as free runs tell it
+    whole  all that every vehicle has, as free runs tell it; `free` with what may lead, if anything
     """
     fitter = search.fitter
-    if fitter.excess(whole.fit) < MUCH:
+    if fitter.excess((free or whole).fit) < MUCH:
         return None
     sea = with_sea(fitter, whole) if fitter.excess(whole.fit) < LOST else _continued(search)
-    if sea is None or not _lead_away(fitter, whole, sea):
+    if sea is None or not _lead_away(fitter, free or whole, sea):
         return None
     sea = _with_what_gains(search, _among_look_alikes(search, sea))
     if sea is None or (sea.fit.noise[2:4] > MOST_FORCES * np.square(fitter.accelerations)).any():
