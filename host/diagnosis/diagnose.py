@@ -13,7 +13,7 @@ from host.diagnosis.explain import explain
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.leftover import Leftover
-from host.diagnosis.fits.margins import NAMING_MARGIN
+from host.diagnosis.fits.margins import LARGEST_SET, NAMING_MARGIN
 from host.diagnosis.fits.patience import is_over, was_cut
 from host.diagnosis.fits.sea_fits import WAVES, again_in_waves, again_under_forces, with_regular_waves
 from host.diagnosis.fits.workers import Workers, sharing
@@ -199,7 +199,7 @@ def _diagnosed(
     stds = np.array([std.get(name, 0.0) for name in NAMES])
     hardly = [left_open(found.fit.parameters, stds)] * (judged.verdict == "no_mismatch")
     return Diagnosis(
-        verdict=_on_all(judged.verdict, way),
+        verdict=_on_all(judged, way),
         recordings=recordings,
         floor=floor,
         base=base,
@@ -242,13 +242,14 @@ def _apart(way: Way) -> str:
     )
 
 
-def _on_all(verdict: Verdict, way: Way) -> Verdict:
+def _on_all(judged: Judged, way: Way) -> Verdict:
     """The verdict on all of a recording of which stretches were left out, or a plane known in part.
 
-    Or where the search had not asked all.
+    Or where many effects leave nothing before the search had asked all: with time fewer may.
     """
-    is_of_part = way.apart or way.is_astray or was_cut()
-    return "partly_explained" if is_of_part and verdict in ("explained", "no_mismatch") else verdict
+    is_of_part = way.apart or way.is_astray or (was_cut() and len(judged.effects) > LARGEST_SET)
+    is_less = is_of_part and judged.verdict in ("explained", "no_mismatch")
+    return "partly_explained" if is_less else judged.verdict
 
 
 def _is_likelier(other: Way, explained: Explained) -> bool:

@@ -10,8 +10,10 @@ from hidden_dive import Extra, hidden_dive, nothing
 
 from host.catalogue import structure_of
 from host.diagnosis import plane_choice
-from host.diagnosis.diagnose import _apart, _on_all
+from host.diagnosis.diagnose import Judged, _apart, _on_all
 from host.diagnosis.plane_choice import Way, likelier_first
+from host.diagnosis.proof.scoring import Misfit
+from host.diagnosis.proof.verdict import Verdict
 from host.diagnosis.search import apart
 from host.diagnosis.search import short_runs as pieces
 from host.diagnosis.search.apart import stretches_apart
@@ -200,8 +202,13 @@ def test_what_is_apart_is_left_out_and_told(monkeypatch: pytest.MonkeyPatch) -> 
     assert rest[0][0].notes == ("other physics acts, and left out: 100 to 140 s",)
     assert "From 100 to 140 s other physics acts" in _apart(way)
     assert _apart(Way([dive], cast("Any", fitter))) == ""
-    assert _on_all("explained", way) == "partly_explained"
-    assert _on_all("no_mismatch", way) == "partly_explained"
-    assert _on_all("explained", way._replace(apart=(), is_astray=True)) == "partly_explained"
-    assert _on_all("unexplained", way) == "unexplained"
-    assert _on_all("explained", Way([dive], cast("Any", fitter))) == "explained"
+    misfit = Misfit(depth_rmse_m=1.0, pitch_rmse_rad=1.0, chi2_depth=1.0, chi2_pitch=1.0)
+
+    def judged(verdict: Verdict) -> Judged:
+        return Judged(misfit, misfit, [], verdict, {})
+
+    assert _on_all(judged("explained"), way) == "partly_explained"
+    assert _on_all(judged("no_mismatch"), way) == "partly_explained"
+    assert _on_all(judged("explained"), way._replace(apart=(), is_astray=True)) == "partly_explained"
+    assert _on_all(judged("unexplained"), way) == "unexplained"
+    assert _on_all(judged("explained"), Way([dive], cast("Any", fitter))) == "explained"

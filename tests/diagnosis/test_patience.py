@@ -1,8 +1,12 @@
 """A search that is to end early, and what it then says."""
 
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
 from hidden_dive import hidden_dive
 
-from host.diagnosis.diagnose import CUT_SHORT, diagnose
+from host.diagnosis.diagnose import CUT_SHORT, _on_all, diagnose
 from host.diagnosis.fits.patience import is_over, patience, was_cut
 
 
@@ -32,6 +36,24 @@ def test_a_search_is_cut_only_where_something_was_to_be_asked_later() -> None:
 def test_a_search_without_time_answers_with_what_one_effect_tells_and_says_so() -> None:
     with patience(0.0):
         found = diagnose([hidden_dive(lambda _, x, __: (0.8 * x[1], 0.0, 0.0), seed=1)])
-    assert found.verdict == "partly_explained"
+    assert found.verdict == "explained"  # one effect leaves nothing
     assert CUT_SHORT in found.remaining
     assert [effect.name for effect in found.effects] == ["heave_pitch_rate_coupling"]
+
+
+@pytest.mark.parametrize(
+    ("effects", "limit", "verdict"),
+    [
+        (4, 0.0, "explained"),
+        (5, 0.0, "partly_explained"),
+        (5, 3600.0, "explained"),
+    ],
+)
+def test_many_effects_are_no_whole_answer_before_all_was_asked(
+    effects: int, limit: float, verdict: str
+) -> None:
+    judged: Any = SimpleNamespace(verdict="explained", effects=["..."] * effects)
+    way: Any = SimpleNamespace(apart=(), is_astray=False)
+    with patience(limit):
+        is_over()
+        assert _on_all(judged, way) == verdict
