@@ -33,7 +33,7 @@ SHALLOWEST = {side: f"layers_{side}_top" for side in LAYERED_KIND}
 DEEPEST = {side: f"layers_{side}_bottom" for side in LAYERED_KIND}
 """The parameters that hold the depths, m, between which a force, moment or current goes with the depth."""
 
-NARROW = 0.002  # m/s, rad/s or rad: what dry friction needs to turn about
+NARROW = 0.002  # m/s or rad/s: what dry friction needs to turn about
 
 Term = Callable[[tuple[ca.SX, ...]], ca.SX]
 
@@ -139,28 +139,6 @@ def _directed(side: Side) -> Effect:
         manoeuvre="slow and fast steps of the same size",
         probes=((0.0, NARROW),),
         sizes=(own,),
-        force=force,
-    )
-
-
-def _dead_plane() -> Effect:
-    def force(c: Chain) -> None:
-        short = c.p["dead_plane"] * _direction(c.plane, c.p["dead_plane_width"])
-        c.heave += c.p["b1"] * short
-        c.pitch += c.p["b2"] * short
-
-    return Effect(
-        name="unknown_plane_by_direction",
-        slot="actuator",
-        parameters=(
-            Parameter(name="dead_plane", unit="rad", lower=-0.5, upper=0.5, meaning="angle, by its sign"),
-            _width("dead_plane_width", "rad"),
-        ),
-        sentence="The plane acts as if it stood further over, or less far, by the same angle to both sides.",
-        equation="w' = ... + b1 s, q' = ... + b2 s, s = dead_plane delta/sqrt(delta^2 + dead_plane_width^2)",
-        manoeuvre="small and large steps of the plane",
-        probes=((0.0, 5.0 * NARROW),),
-        sizes=("dead_plane",),
         force=force,
     )
 
@@ -310,7 +288,7 @@ HARDENING = Effect(
     force=_hardening,
 )
 
-_LEADING = (_directed("heave"), _directed("pitch"), _dead_plane(), HARDENING)
+_LEADING = (_directed("heave"), _directed("pitch"), HARDENING)
 LEADING_FORMS = (*(form.name for form in _LEADING), "unknown_plane_abs_delta")
 """Forms that bend the base, and all that every vehicle has, until they no longer promise anything."""
 

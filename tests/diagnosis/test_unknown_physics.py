@@ -201,17 +201,15 @@ def test_all_forms_together_have_names_of_their_own() -> None:
     assert len(set(names)) == len(names)
 
 
-DRY = {"unknown_force_by_direction": 0, "unknown_moment_by_direction": 1, "unknown_plane_by_direction": 2}
+DRY = {"unknown_force_by_direction": 0, "unknown_moment_by_direction": 1}
 
 
 @pytest.mark.parametrize(("form", "way"), DRY.items())
 def test_what_goes_with_a_direction_alone_is_told_by_its_size(form: str, way: int) -> None:
-    sizes = (-0.05, -0.3, -0.04)  # m/s^2, rad/s^2 and rad, against what moves and against the plane
+    sizes = (-0.05, -0.3)  # m/s^2 and rad/s^2, against the motion
 
-    def dry(_: float, x: np.ndarray, plane: float) -> tuple[float, float, float]:  # type: ignore[type-arg]
-        friction = sizes[way] * np.tanh([x[0], x[1], plane][way] / 0.01)
-        if way == 2:
-            return BASE["b1"] * friction, BASE["b2"] * friction, 0.0
+    def dry(_: float, x: np.ndarray, __: float) -> tuple[float, float, float]:  # type: ignore[type-arg]
+        friction = sizes[way] * np.tanh(x[way] / 0.01)
         return friction * (way == 0), friction * (way == 1), 0.0
 
     fitter = Fitter([hidden_dive(dry, duration=60.0)])

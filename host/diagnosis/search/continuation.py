@@ -204,7 +204,12 @@ def _moved(search: "Search", steered: list[Explanation]) -> list[Explanation]:
 
 
 def _steered(search: "Search", points: list[Point], steps: int = FEW_STEPS) -> list[Explanation]:
-    """Where steps of the parameters lead under each point's forces, unless it loses the recording."""
+    """Where steps of the parameters lead under each point's forces, unless it loses the recording.
+
+    Nowhere once it takes too long.
+    """
+    if is_over():
+        return []
     found = search.workers.results([(_climbed, (point, steps)) for point in points])
     return [one for one in found if np.isfinite(one.fit.log_likelihood)]
 

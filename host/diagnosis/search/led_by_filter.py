@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 MOST_LEFT = 3.0  # times the noise floor: a sensor that is read between its readings looks smoother than it is
 NOTHING_ELSE = 0.03  # of BIC a sample, that anything may gain beside the forces: what a free run lost is more
-FORCED = 0.5  # of BIC a sample, by which forces lead a free run away
+FORCED = 0.25  # of BIC a sample, by which forces lead a free run away, whatever goes with time or depth
 MOST_MORE, PROMISING = 2, 2  # effects that join beside the forces, and those that are tried for each
 
 
