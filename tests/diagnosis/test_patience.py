@@ -1,13 +1,27 @@
 """A search that is to end early, and what it then says."""
 
+from math import inf
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from hidden_dive import hidden_dive
 
 from host.diagnosis.diagnose import CUT_SHORT, _on_all, diagnose
 from host.diagnosis.fits.patience import is_over, patience, was_cut
+from tools.commands.diagnose import _seconds
+
+
+@pytest.mark.parametrize(
+    ("duration", "minutes", "limit"),
+    [(60.0, None, 240.0), (1100.0, None, 480.0), (60.0, 0.5, 30.0), (60.0, 0.0, inf)],
+)
+def test_long_recordings_have_longer_and_none_is_no_limit(
+    duration: float, minutes: float | None, limit: float
+) -> None:
+    rows: Any = SimpleNamespace(time=np.arange(0.0, duration, 0.1))
+    assert _seconds([rows], minutes) == limit
 
 
 def test_there_is_no_limit_unless_one_is_set() -> None:

@@ -149,6 +149,7 @@ def test_a_plane_that_never_moved_ends_with_no(tmp_path: Path, capsys: pytest.Ca
         (["identify", "{recording}", "--leave-out", "60-x"], "give START-END"),
         (["identify", "{recording}", "--leave-out", "0-100"], "leaves nothing"),
         (["diagnose", "{recording}", "--leave-out", "7", "--quiet"], "give START-END"),
+        (["diagnose", "{recording}", "--minutes", "-1"], "--minutes must not be negative"),
         (
             ["diagnose", "{recording}", "--leave-out", "6-9", "--simulation", "{recording}"],
             "--leave-out cannot",
