@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.catalogue import ORDINARY
+from host.catalogue import ORDINARY, named
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
@@ -53,6 +53,10 @@ def led_by_a_filter(
         return None
     sea = _with_what_gains(search, _among_look_alikes(search, sea))
     if sea is None or (sea.fit.noise[2:4] > MOST_FORCES * np.square(fitter.accelerations)).any():
+        return None
+    # What keeps a plane back is told by white noise alone: of several each does a part of another's work.
+    of_plane = [name for name in sea.names - whole.names if named(name).slot == "actuator"]
+    if of_plane and not sea.leaves_white:
         return None
     is_hull = has_usual_heave(sea.fit.end) and has_damped_pitch(sea.fit.end)
     return sea if is_hull and fitter.excess(sea.fit) < MOST_LEFT and _do_the_same(fitter, sea) else None
