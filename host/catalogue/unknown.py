@@ -33,7 +33,8 @@ SHALLOWEST = {side: f"layers_{side}_top" for side in LAYERED_KIND}
 DEEPEST = {side: f"layers_{side}_bottom" for side in LAYERED_KIND}
 """The parameters that hold the depths, m, between which a force, moment or current goes with the depth."""
 
-NARROW = 0.002  # m/s or rad/s: what dry friction needs to turn about
+NARROW = 0.002  # m/s or rad/s: within which dry friction turns about, to begin with
+LEAST_WIDTH, MOST_WIDTH = 0.0004, 0.05
 
 Term = Callable[[tuple[ca.SX, ...]], ca.SX]
 
@@ -127,12 +128,15 @@ def _directed(side: Side) -> Effect:
 
     def force(c: Chain) -> None:
         x = getattr(c, rate)
-        setattr(c, side, getattr(c, side) + c.p[own] * _direction(x, c.p[width]))
+        setattr(c, side, getattr(c, side) + c.p[own] * x / ca.sqrt(x**2 + c.p[width] ** 2))
 
     return Effect(
         name=f"unknown_{KIND[side]}_by_direction",
         slot=side,
-        parameters=(_constant(side, own), _width(width, unit)),
+        parameters=(
+            Parameter(name=own, unit=UNIT[side], lower=-MOST[side], upper=MOST[side], meaning="its size"),
+            Parameter(name=width, unit=unit, lower=LEAST_WIDTH, upper=MOST_WIDTH, meaning="where it turns"),
+        ),
         sentence=f"A {KIND[side]} acts that goes with the direction of {rate} and hardly with its size, as "
         "dry friction does.",
         equation=f"{RATE[side]} = ... + {own} {rate}/sqrt({rate}^2 + {width}^2)",
@@ -141,20 +145,6 @@ def _directed(side: Side) -> Effect:
         sizes=(own,),
         force=force,
     )
-
-
-def _constant(side: Side, name: str) -> Parameter:
-    return Parameter(name=name, unit=UNIT[side], lower=-MOST[side], upper=MOST[side], meaning="its size")
-
-
-def _width(name: str, unit: str) -> Parameter:
-    return Parameter(
-        name=name, unit=unit, lower=0.2 * NARROW, upper=25.0 * NARROW, meaning="where it gives way"
-    )
-
-
-def _direction(x: ca.SX, width: ca.SX) -> ca.SX:
-    return x / ca.sqrt(x**2 + width**2)
 
 
 def _any_smooth_force(c: Chain) -> None:

@@ -14,7 +14,7 @@ from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LARGEST_SET, LITTLE, MUCH, NAMING_MARGIN, margin
 from host.diagnosis.fits.patience import is_over
-from host.diagnosis.fits.sea_fits import as_filtered, with_sea, with_waves
+from host.diagnosis.fits.sea_fits import as_filtered, lead_away, with_sea, with_waves
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.plane_astray import astray_share, whole_astray
 from host.diagnosis.recordings.spans import divide, excerpt
@@ -234,7 +234,7 @@ def _astray(found: list[Way], whole: Explanation, on_progress: Callable[[str], N
         return []
     calm = whole if moving[0] is found[0] else _taken_so(fitter, whole)
     sea = with_sea(fitter, calm)
-    if as_filtered(fitter, calm).bic < sea.bic + FORCED * sea.fit.samples:
+    if not lead_away(fitter, calm, sea, FORCED):
         return []
     recordings = [with_plane_astray(one, share) for one in moving[0].recordings]
     fitter = Fitter(excerpt(divide(recordings).teaching))
@@ -267,7 +267,7 @@ def _as_seen_under_forces(found: list[Way], whole: Explanation) -> list[tuple[Wa
     if not others or leading.fitter.excess(whole.fit) < LITTLE:
         return []
     sea = with_sea(leading.fitter, whole)
-    if as_filtered(leading.fitter, whole).bic < sea.bic + FORCED * sea.fit.samples:
+    if not lead_away(leading.fitter, whole, sea, FORCED):
         return []
     sets = [whole, *(way.outset or _taken_so(way.fitter, whole) for way in others)]
     seas = [sea, *(with_sea(way.fitter, own) for way, own in zip(others, sets[1:], strict=True))]

@@ -132,5 +132,5 @@ def test_a_logger_that_reads_between_readings_is_led_as_well_but_none_that_a_fre
     monkeypatch.setattr(led_by_filter, "_continued", lambda _: sea)
     monkeypatch.setattr(led_by_filter, "_among_look_alikes", lambda _, one: one)
     monkeypatch.setattr(led_by_filter, "_with_what_gains", lambda _, one: one)
-    monkeypatch.setattr(led_by_filter, "_do_the_same", lambda *_: away)
+    monkeypatch.setattr(led_by_filter, "_needs_forces", lambda *_: away)
     assert (led(fitter, whole) is sea) == is_led

@@ -8,6 +8,7 @@ import pytest
 
 from host.catalogue import ORDINARY
 from host.diagnosis import plane_choice
+from host.diagnosis.fits import sea_fits
 from host.diagnosis.fits.margins import MUCH
 from host.diagnosis.plane_choice import Way, likelier_first
 from host.diagnosis.search.outset import LOST
@@ -69,7 +70,7 @@ def test_where_forces_lead_they_tell_which_way_the_plane_went(
     whole: Any = SimpleNamespace(bic=0.0, fit=None)
     other: Any = SimpleNamespace(bic=1.0)
     monkeypatch.setattr(plane_choice, "_taken_so", lambda *_: other)
-    monkeypatch.setattr(plane_choice, "as_filtered", lambda _, one: one)
+    monkeypatch.setattr(sea_fits, "as_filtered", lambda _, one: one)
     forced = SimpleNamespace(samples=100)
     monkeypatch.setattr(plane_choice, "with_sea", lambda f, _: SimpleNamespace(bic=f.sea, fit=forced))
     seen = plane_choice._as_seen_under_forces(found, whole)

@@ -37,6 +37,11 @@ def as_filtered(fitter: Fitter, explanation: Explanation) -> Explanation:
     return fitter.explained(explanation.names, output_error(fit.end, inputs, fit.free))
 
 
+def lead_away(fitter: Fitter, free: Explanation, sea: Explanation, by: float) -> bool:
+    """Whether random forces explain so much of BIC a sample more than a set does without."""
+    return bool(as_filtered(fitter, free).bic > sea.bic + by * sea.fit.samples)
+
+
 def roughly_with_waves(fitter: Fitter, explanation: Explanation) -> Explanation:
     """A set among white forces, among waves in their place: a few steps, to see whether that is likelier."""
     return with_waves(fitter, explanation, most_steps=FEW_STEPS)

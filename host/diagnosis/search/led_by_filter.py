@@ -17,7 +17,7 @@ from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import MUCH, margin
 from host.diagnosis.fits.prospects import form_gains
-from host.diagnosis.fits.sea_fits import as_filtered, with_sea
+from host.diagnosis.fits.sea_fits import lead_away, with_sea
 from host.diagnosis.fits.workers import Task, Workers
 from host.diagnosis.recordings.spans import led_excerpt
 from host.diagnosis.search.continuation import continued
@@ -45,11 +45,11 @@ def led_by_a_filter(
 
     whole  all that every vehicle has, as free runs tell it; `free` with what may lead, if anything
     """
-    fitter = search.fitter
-    if fitter.excess((free or whole).fit) < MUCH:
+    fitter, free = search.fitter, free or whole
+    if fitter.excess(free.fit) < MUCH:
         return None
     sea = with_sea(fitter, whole) if fitter.excess(whole.fit) < LOST else _continued(search)
-    if sea is None or not _lead_away(fitter, free or whole, sea):
+    if sea is None or not lead_away(fitter, free, sea, FORCED):
         return None
     sea = _with_what_gains(search, _among_look_alikes(search, sea))
     if sea is None or (sea.fit.noise[2:4] > MOST_FORCES * np.square(fitter.accelerations)).any():
@@ -59,7 +59,7 @@ def led_by_a_filter(
     if of_plane and not sea.leaves_white:
         return None
     is_hull = has_usual_heave(sea.fit.end) and has_damped_pitch(sea.fit.end)
-    return sea if is_hull and fitter.excess(sea.fit) < MOST_LEFT and _do_the_same(fitter, sea) else None
+    return sea if is_hull and fitter.excess(sea.fit) < MOST_LEFT and _needs_forces(fitter, sea) else None
 
 
 def _continued(search: "Search") -> Explanation | None:
@@ -89,11 +89,6 @@ def _followed(fitter: Fitter, names: Names, start: Point) -> Explanation:
     return fitter.explained(names, fitter.carried_on(start))
 
 
-def _lead_away(fitter: Fitter, free: Explanation, sea: Explanation) -> bool:
-    """Whether forces explain so much that free runs tell next to nothing."""
-    return bool(as_filtered(fitter, free).bic > sea.bic + FORCED * sea.fit.samples)
-
-
 def _with_what_gains(search: "Search", sea: Explanation) -> Explanation | None:
     """The same with what gains beside the forces; None where more does, or a form gains most."""
     least = max(margin(sea) + log(sea.fit.samples), NOTHING_ELSE * sea.fit.samples)
@@ -112,7 +107,7 @@ def _with_what_gains(search: "Search", sea: Explanation) -> Explanation | None:
     return None
 
 
-def _do_the_same(fitter: Fitter, sea: Explanation) -> bool:
-    """Whether the same set without the forces, from where they led it, is led away, too."""
+def _needs_forces(fitter: Fitter, sea: Explanation) -> bool:
+    """Whether the set is led away without its forces, also from where these have led it."""
     point = sea.fit.end.with_noise(np.array([*fitter.floor, 0.0, 0.0]))
-    return _lead_away(fitter, _followed(fitter, sea.names, point), sea)
+    return lead_away(fitter, _followed(fitter, sea.names, point), sea, FORCED)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 PIECE, LEAST_ROWS = 25.0, 100  # s and rows of a piece, at least
 LEAST_PIECES = 8
-MOST_ROWS, SPREAD = 6000, 4000  # rows that are fitted at once, which takes a minute; of more so many, spread
+MOST_ROWS, SPREAD = 6000, 4000  # rows that are fitted at once; of more so many, spread
 NEAR = 30.0  # times the noise floor, from where a fit may still come to its end
 MOST_POLISHED = 4
 SLIGHTEST = 1e-3  # of the variance of all force, to begin with
