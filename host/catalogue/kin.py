@@ -22,6 +22,34 @@ AS_A_LEVER = {"depth_sensor_lever_arm": "sensor_forward", "heave_pitch_accelerat
 """Of those, two that do the very same beside another coupling and pitch damping, with their sizes."""
 
 
+def moving_alike(known: dict[str, float], name: str, size: float) -> dict[str, float]:
+    """What the coefficients are beside a lever arm of this size, or its double, if those without move alike.
+
+    With s = w - x q, the heave speed at a sensor x ahead, the equations of w and q are those of s and q with
+    a1 - c_qw x, b1 - b2 x, c_wq - a2 x + (a1 - c_qw x) x and a2 + c_qw x in the place of a1, b1, c_wq and a2.
+    A c_wa adds to heave what q' is. Unchanged where the set has no c_wq to move with them, or one of the two:
+    what a3 does to heave beside them is all that tells such motions apart.
+    """
+    if "c_wq" not in known or not known.keys().isdisjoint(AS_A_LEVER.values()):
+        return known
+    munk = known.get("c_qw", 0.0)
+    if name == "depth_sensor_lever_arm":
+        a2 = known["a2"] - munk * size
+        moved = {
+            "a1": known["a1"] + munk * size,
+            "b1": known["b1"] + known["b2"] * size,
+            "a2": a2,
+            "c_wq": known["c_wq"] + (a2 - known["a1"]) * size,
+        }
+    else:
+        moved = {
+            "a1": known["a1"] - munk * size,
+            "b1": known["b1"] - known["b2"] * size,
+            "c_wq": known["c_wq"] - known["a2"] * size,
+        }
+    return known | moved
+
+
 def is_time(effect: Effect) -> bool:
     """Whether a delay or a time constant is all that it has."""
     return [parameter.unit for parameter in effect.parameters] == ["s"]

@@ -101,14 +101,17 @@ def likelier_first(
     if whole is not None and says_all(leading.fitter, whole):
         return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
     one = None if whole is None else one_that_says_all(leading.fitter, whole, jobs)
+    seen = _among_waves(found)
     if whole is not None and one is None and not is_over():
+        if not seen and (led := _led_by_a_filter([leading, *others], whole, whole, on_progress, jobs)):
+            return led
         told, whole = _at_speeds_or_in_short_runs([leading, *others], whole, on_progress, jobs, may_leave_out)
         if told:
             return told
     plain = whole
     if whole is not None:
         whole = one or (whole if is_over() else beside_what_leads(leading.fitter, whole, jobs))
-    if seen := _among_waves(found):
+    if seen:
         on_progress("what every vehicle has, in the waves")
         return _in_a_swell(seen, whole)
     if whole is not None and is_over():
@@ -123,8 +126,7 @@ def likelier_first(
     if plain is not None and whole is not None and not is_over():
         # What goes with time or depth may follow what water does at random: then it leads nowhere.
         hull = plain if whole.names.isdisjoint({*SCANS, *DRIVE, *LEADING_FORMS}) else whole
-        filtered = partial(led_by_a_filter, whole=hull, free=whole)
-        if led := _led([leading, *others], whole, filtered, on_progress, jobs):
+        if led := _led_by_a_filter([leading, *others], hull, whole, on_progress, jobs):
             return led
     begun, leads = [leading, *others], whole is not None and leads_on(leading.fitter, whole)
     if whole is not None and leads:
@@ -136,6 +138,13 @@ def likelier_first(
         leads = True
     pushed = [] if whole is None else _pushed_about(begun, whole, on_progress, jobs)
     return pushed or (begun if leads else by_single_effects(found, on_progress, jobs))
+
+
+def _led_by_a_filter(
+    found: list[Way], hull: Explanation, free: Explanation, on_progress: Callable[[str], None], jobs: int
+) -> list[Way]:
+    """The ways as a filter sees them that leads the hull, where no free run of all that is known does."""
+    return _led(found, free, partial(led_by_a_filter, whole=hull, free=free), on_progress, jobs)
 
 
 def _at_speeds_or_in_short_runs(

@@ -196,6 +196,7 @@ def test_what_is_apart_is_left_out_and_told(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(plane_choice, "stretches_apart", lambda *_: apart.Apart([(BEGINS, ENDS)]))
     monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: None if rest else whole)
     monkeypatch.setattr(plane_choice, "plain_waves", lambda _: None)
+    monkeypatch.setattr(plane_choice, "_led", lambda *_: [])
     (way,) = likelier_first([Way([dive], cast("Any", fitter))], lambda _: None, 1, may_leave_out=True)
     assert way.apart == ((BEGINS, ENDS),)
     assert [piece.time[[0, -1]].round(1).tolist() for piece in rest[0]] == [[0.0, 99.9], [140.0, 249.9]]

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -73,7 +74,13 @@ def test_an_unstable_hull_is_led_by_a_filter() -> None:
 def test_what_keeps_its_plane_back_gains_beside_the_forces() -> None:
     fitter, whole = begun(0.08)
     assert fitter.excess(whole.fit) > LOST
-    assert led(fitter, whole) is None
+    found = led(fitter, whole)
+    assert found is not None
+    assert "actuator_saturation" in found.names
+    assert "fin_stall" not in found.names  # which joins first
+    values = dict(zip(found.fit.structure.names, found.fit.parameters.tolist(), strict=True))
+    assert values["plane_limit"] == pytest.approx(0.08, rel=0.03)
+    assert all(values[name] == pytest.approx(HULL[name], rel=0.3) for name in ("b1", "b2", "c_wq", "c_qw"))
 
 
 def test_a_hull_that_a_free_run_follows_needs_no_filter() -> None:
@@ -88,7 +95,7 @@ class Stub:
         self._gains, self.workers, self.fitter = list(gains), self, None
 
     def gains(self, _: Explanation) -> dict[str, float]:
-        return self._gains.pop(0)
+        return {"munk_moment": 0.0} | self._gains.pop(0)
 
     def growth(self, parent: Explanation, name: str) -> Explanation:
         return replace(parent, names=parent.names | {name}, bic=parent.bic - 1000.0)
@@ -100,8 +107,10 @@ class Stub:
 @pytest.mark.parametrize(
     ("gains", "form", "joined"),
     [
-        ([{"actuator_delay": 1.0}], 0.0, set()),
+        ([{"munk_moment": 1.0}], 0.0, set()),
         ([{"actuator_delay": 900.0}, {"ballast_change": 1.0}], 0.0, {"actuator_delay"}),
+        ([{"depth_sensor_lever_arm": 60.0}, {}], 0.0, {"depth_sensor_lever_arm"}),  # it is there throughout
+        ([{"ballast_change": 60.0}], 0.0, set()),  # what passes may follow the forces
         ([{"actuator_delay": 900.0}], 950.0, None),  # a form promises more
         ([{"actuator_delay": 900.0}, {"ballast_change": 900.0}, {"internal_wave": 900.0}], 0.0, None),
     ],
@@ -110,11 +119,56 @@ def test_what_gains_beside_the_forces_joins_unless_it_is_too_much_or_of_no_catal
     gains: list[dict[str, float]], form: float, joined: set[str] | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(led_by_filter, "form_gains", lambda *_: {"unknown_force_w_w": form})
+    monkeypatch.setattr(led_by_filter, "margin", lambda _: 6.0)
     monkeypatch.setattr(led_by_filter, "_among_look_alikes", lambda _, sea: sea)
     sea: Any = Explanation(frozenset(), begun(np.inf)[0].root.fit, 0.0)
     search: Any = Stub(*gains)
     found = led_by_filter._with_what_gains(search, sea)
     assert (None if found is None else {*found.names}) == joined
+
+
+def test_what_joined_too_soon_goes_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    worth = {"pitch_bias": -5.0, "vertical_current": 30.0, "actuator_rate_limit": -9.0}
+    bic = lambda names: -sum(worth.get(name, 1.0) for name in names)  # noqa: E731
+    less = lambda _, one, name: replace(one, names=one.names - {name}, bic=bic(one.names - {name}))  # noqa: E731
+    monkeypatch.setattr(led_by_filter, "_less", less)
+    search: Any = SimpleNamespace(
+        workers=SimpleNamespace(results=lambda tasks: [less(None, *given) for _, given in tasks])
+    )
+    names = frozenset({*worth, "munk_moment"})
+    sea: Any = Explanation(names, begun(np.inf)[0].root.fit, bic(names))
+    found = led_by_filter._without_the_idle(search, sea, frozenset({"munk_moment"}))
+    assert found.names == {"munk_moment", "vertical_current"}
+
+
+@pytest.mark.parametrize(
+    ("worth", "is_white", "are_needed"), [(900.0, False, True), (40.0, False, False), (40.0, True, True)]
+)
+def test_what_keeps_the_plane_back_is_worth_much_where_no_white_noise_tells_it(
+    worth: float, is_white: bool, are_needed: bool
+) -> None:
+    fit = SimpleNamespace(samples=3000)
+    sea: Any = SimpleNamespace(
+        names=frozenset({"actuator_saturation"}), fit=fit, bic=0.0, leaves_white=is_white
+    )
+    search: Any = SimpleNamespace(workers=SimpleNamespace(results=lambda _: [SimpleNamespace(bic=worth)]))
+    assert led_by_filter._are_needed(search, sea, ["actuator_saturation"]) == are_needed
+
+
+@pytest.mark.parametrize(
+    ("lost", "shows"),
+    [((90.0, 90.0), True), ((90.0, 9.0), False), ((90.0, None), False)],
+)
+def test_a_hull_of_which_a_textbook_knows_all_is_not_led(
+    lost: tuple[float | None, ...], shows: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    worth = dict(zip(["munk_moment", "heave_quadratic_drag"], lost, strict=True)) | {"ballast_change": 900.0}
+    foretold = lambda _, effect: None if (one := worth[effect.name]) is None else (one, None)  # noqa: E731
+    monkeypatch.setattr(led_by_filter, "one_step_without", foretold)
+    monkeypatch.setattr(led_by_filter, "margin", lambda _: 6.0)
+    fitter: Any = SimpleNamespace(free_parameters=lambda _: 1)
+    sea: Any = SimpleNamespace(names=frozenset(worth), fit=SimpleNamespace(samples=3000))
+    assert led_by_filter._shows_a_hull(fitter, sea) == shows
 
 
 @pytest.mark.parametrize(
@@ -132,5 +186,7 @@ def test_a_logger_that_reads_between_readings_is_led_as_well_but_none_that_a_fre
     monkeypatch.setattr(led_by_filter, "_continued", lambda _: sea)
     monkeypatch.setattr(led_by_filter, "_among_look_alikes", lambda _, one: one)
     monkeypatch.setattr(led_by_filter, "_with_what_gains", lambda _, one: one)
+    monkeypatch.setattr(led_by_filter, "_without_the_idle", lambda _, one, __: one)
+    monkeypatch.setattr(led_by_filter, "_shows_a_hull", lambda *_: True)
     monkeypatch.setattr(led_by_filter, "_needs_forces", lambda *_: away)
     assert (led(fitter, whole) is sea) == is_led

@@ -18,7 +18,8 @@ MANY = frozenset({*ORDINARY})
 
 def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> None:
     def way(root: float, there: float) -> Way:
-        fitter = SimpleNamespace(root=SimpleNamespace(bic=root, fit=2.0 * MUCH), excess=lambda fit: fit)
+        known = SimpleNamespace(bic=root, fit=2.0 * MUCH)
+        fitter = SimpleNamespace(root=known, base=known, excess=lambda fit: fit)
         fitter.there, fitter.polished = SimpleNamespace(bic=there, fit=0.1), lambda one: one
         return Way([], cast("Any", fitter))
 
@@ -108,6 +109,8 @@ def test_several_speeds_are_asked_for_where_no_single_change_is_all_and_more_is_
     monkeypatch.setattr(plane_choice, "one_that_says_all", lambda *_: None)
     monkeypatch.setattr(plane_choice, "at_several_speeds", lambda *_: told)
     monkeypatch.setattr(plane_choice, "_in_short_runs", lambda _, whole, *__: (short, whole))
+    monkeypatch.setattr(plane_choice, "_among_waves", lambda _: [])
+    monkeypatch.setattr(plane_choice, "_led", lambda *_: [])
     fitter: Any = SimpleNamespace(root=SimpleNamespace(bic=0.0), excess=lambda fit: fit)
     found = likelier_first([Way([], fitter)], lambda _: None, 1, may_leave_out=True)
     assert [way.outset for way in found] == [told if left > LOST else None]

@@ -9,7 +9,7 @@ import pytest
 from hidden_dive import BASE, hidden_dive
 
 from host.catalogue import named, structure_of
-from host.catalogue.kin import AS_A_LEVER
+from host.catalogue.kin import AS_A_LEVER, moving_alike
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.prospects import probed, whitened_at
@@ -266,6 +266,27 @@ def test_a_buoyancy_beside_a_lag_is_found_although_each_alone_is_far_off() -> No
     assert fitter.excess(found.fit) < 1.5
     lag = dict(zip(found.fit.structure.names, found.fit.parameters.tolist(), strict=True))["pitch_lag_time"]
     assert lag == pytest.approx(1.04, rel=0.1)
+
+
+@pytest.mark.parametrize("name", [*AS_A_LEVER])
+def test_what_a_lever_arm_joins_moves_as_before(name: str) -> None:
+    rows = hidden_dive(duration=30.0)
+    rows = replace(rows, rudder=0.05 * rows.rudder)  # as far as an angle is its sine
+    others = frozenset({"heave_pitch_rate_coupling", "munk_moment"})
+    without, beside = structure_of(others), structure_of(others | {name})
+    known = dict.fromkeys(without.names, 0.0) | BASE | {"a3": 0.0, "c_wq": 0.5, "c_qw": 0.7}
+    moved = moving_alike(known, name, 0.8) | {AS_A_LEVER[name]: 0.8}
+    before, after = (
+        free_run(
+            np.array([values[own] for own in structure.names]), AT_REST, inputs_of(rows, structure)
+        ).outputs
+        for values, structure in ((known, without), (moved, beside))
+    )
+    assert np.abs(after - before)[0].max() < 1e-6
+    assert np.abs(after - before)[1].max() < 2e-4
+    assert np.abs(before[1] - before[1].mean()).max() > 0.1
+    assert moving_alike(moved, name, 0.3) is moved
+    assert moving_alike(BASE, name, 0.3) is BASE
 
 
 @pytest.mark.parametrize("is_lever", [True, False])

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from host.catalogue import named, structure_of
+from host.catalogue.kin import AS_A_LEVER, moving_alike
 from host.compiled.side_by_side import side_by_side
 from host.diagnosis.fits.absence import one_step_without
 from host.diagnosis.fits.explanation import Explanation, Names
@@ -185,10 +186,13 @@ class Fitter(Setting):
         fit = parent.fit
         known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
         if added is not None and probe is not None:
+            if added in AS_A_LEVER:
+                known = moving_alike(known, added, float(probe[0]))
             known |= {p.name: v for p, v in zip(named(added).parameters, probe.tolist(), strict=True)}
         known |= {name: value for name, value in self.held_in(names).items() if name in known}
         structure = structure_of(names)
-        return Point(structure, np.array([known[name] for name in structure.names]), fit.initial, fit.levels)
+        values = structure.clipped(np.array([known[name] for name in structure.names]))
+        return Point(structure, values, fit.initial, fit.levels)
 
     def fitted(self, starts: list[Point], rival: Fit | None = None, first: int = FIRST_ITERATIONS) -> Fit:
         """Goes `first` steps from every start, and on from the best where it may get as far as the rival."""

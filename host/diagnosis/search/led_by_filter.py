@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from host.catalogue import ORDINARY, named
+from host.catalogue import DRIVE, ORDINARY, named
+from host.catalogue.moments import SCANS
 from host.catalogue.nuisance import FREE_TRIM
+from host.diagnosis.fits.absence import one_step_without
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import MUCH, margin
@@ -21,17 +23,23 @@ from host.diagnosis.fits.sea_fits import lead_away, with_sea
 from host.diagnosis.fits.workers import Task, Workers
 from host.diagnosis.recordings.spans import led_excerpt
 from host.diagnosis.search.continuation import continued
-from host.diagnosis.search.outset import LOST, MOST_FORCES
+from host.diagnosis.search.outset import IN_TIME, LOST
+from host.diagnosis.search.whole_vehicle import is_real
+from host.dynamics.equations import NAMES
 from host.likelihood.gauss_newton import Point
-from host.likelihood.valleys import has_damped_pitch, has_usual_heave, look_alikes
+from host.likelihood.valleys import INSTANT, STANDING, has_damped_pitch, look_alikes
 
 if TYPE_CHECKING:
     from host.diagnosis.search.search import Search
 
+MOST_FORCES = 0.2  # of the variance of all force: less than turbulence does to a small hull in level flight
 MOST_LEFT = 3.0  # times the noise floor: a sensor that is read between its readings looks smoother than it is
 NOTHING_ELSE = 0.03  # of BIC a sample, that anything may gain beside the forces: what a free run lost is more
 FORCED = 0.25  # of BIC a sample, by which forces lead a free run away, whatever goes with time or depth
-MOST_MORE, PROMISING = 2, 2  # effects that join beside the forces, and those that are tried for each
+MOST_MORE, MOST_LARGE = 4, 2  # effects that join beside the forces, and those of them that gain so much
+PROMISING = 2  # that are tried for each
+SLOW = -0.03  # 1/s, of a1: a hull of ten metres at half a metre a second
+PASSING = frozenset({*SCANS, *DRIVE, *IN_TIME})  # of these each may follow a little of what forces do
 
 
 def led_by_a_filter(
@@ -51,14 +59,17 @@ def led_by_a_filter(
     sea = with_sea(fitter, whole) if fitter.excess(whole.fit) < LOST else _continued(search)
     if sea is None or not lead_away(fitter, free, sea, FORCED):
         return None
-    sea = _with_what_gains(search, _among_look_alikes(search, sea))
-    if sea is None or (sea.fit.noise[2:4] > MOST_FORCES * np.square(fitter.accelerations)).any():
+    usual = whole.names | {*ORDINARY}
+    lean = _among_look_alikes(search, _without_the_idle(search, sea, usual))
+    grown = _with_what_gains(search, lean)
+    if grown is None:
         return None
-    # What keeps a plane back is told by white noise alone: of several each does a part of another's work.
-    of_plane = [name for name in sea.names - whole.names if named(name).slot == "actuator"]
-    if of_plane and not sea.leaves_white:
+    sea = _without_the_idle(search, grown, usual)
+    if (sea.fit.noise[2:4] > MOST_FORCES * np.square(fitter.accelerations)).any():
         return None
-    is_hull = has_usual_heave(sea.fit.end) and has_damped_pitch(sea.fit.end)
+    if not _are_needed(search, sea, [name for name in sea.names - whole.names if name in DRIVE]):
+        return None
+    is_hull = _is_damped(sea) and _shows_a_hull(fitter, sea)
     return sea if is_hull and fitter.excess(sea.fit) < MOST_LEFT and _needs_forces(fitter, sea) else None
 
 
@@ -89,22 +100,74 @@ def _followed(fitter: Fitter, names: Names, start: Point) -> Explanation:
     return fitter.explained(names, fitter.carried_on(start))
 
 
+def _without_the_idle(search: "Search", sea: Explanation, usual: Names) -> Explanation:
+    """The same less what is not usual and does not pay: it joined before what it did the work of."""
+    while more := sorted(sea.names - usual):
+        fewer: list[Explanation] = search.workers.results([(_less, (sea, name)) for name in more])
+        best = min(fewer, key=lambda e: e.bic)
+        if best.bic > sea.bic:
+            break
+        sea = best
+    return sea
+
+
+def _less(fitter: Fitter, sea: Explanation, name: str) -> Explanation:
+    return fitter.reduced(sea, sea.names - {name})
+
+
 def _with_what_gains(search: "Search", sea: Explanation) -> Explanation | None:
-    """The same with what gains beside the forces; None where more does, or a form gains most."""
-    least = max(margin(sea) + log(sea.fit.samples), NOTHING_ELSE * sea.fit.samples)
+    """The same with what gains beside the forces; None where much does, or a form gains most.
+
+    What passes, or keeps a plane back, must gain as much as no free run lost; what a vehicle has throughout,
+    the place of its depth sensor, say, as much as anywhere.
+    """
+    least = margin(sea) + log(sea.fit.samples)
+    much = max(least, NOTHING_ELSE * sea.fit.samples)
+    large = 0
     for _ in range(MOST_MORE + 1):
         gains = search.gains(sea)
-        likely = sorted((name for name in gains if gains[name] > least), key=lambda name: -gains[name])
-        if max(form_gains(search.fitter, sea).values()) > max(least, *gains.values()):
+        if max(form_gains(search.fitter, sea).values()) > max(much, *gains.values()):
             return None
-        if not likely:
-            return sea
-        grown = search.workers.results([search.growth(sea, name) for name in likely[:PROMISING]])
-        best: Explanation = min(grown, key=lambda e: e.bic)
+        large += max(gains.values()) > much
+        if large > MOST_LARGE:
+            return None
+        likely = [name for name in gains if gains[name] > (much if name in PASSING else least)]
+        likely = sorted(likely, key=lambda name: -gains[name])[:PROMISING]
+        grown = search.workers.results([search.growth(sea, name) for name in likely])
+        best: Explanation = min(grown, key=lambda e: e.bic, default=sea)
         if best.bic > sea.bic - least:
-            return sea  # what a step foretold was not there
+            break  # what a step foretold was not there
         sea = _among_look_alikes(search, best)
-    return None
+    return sea
+
+
+def _are_needed(search: "Search", sea: Explanation, drive: list[str]) -> bool:
+    """Whether each of what keeps the plane back is worth as much as no free run lost.
+
+    Under forces, of several each does a part of another's work.
+    """
+    if sea.leaves_white:
+        return True
+    fewer: list[Explanation] = search.workers.results([(_less, (sea, name)) for name in drive])
+    return all(one.bic > sea.bic + NOTHING_ELSE * sea.fit.samples for one in fewer)
+
+
+def _is_damped(sea: Explanation) -> bool:
+    """Whether it damps its pitching, and its heave, if that of a large one slowly."""
+    speed, heave = sea.fit.parameters[NAMES.index("u0")], sea.fit.parameters[NAMES.index("a1")]
+    return bool(INSTANT < heave < SLOW and speed > STANDING) and has_damped_pitch(sea.fit.end)
+
+
+def _shows_a_hull(fitter: Fitter, sea: Explanation) -> bool:
+    """Whether some of what every vehicle has would be missed: else what pushes it may be few effects."""
+    least, charge = margin(sea), log(sea.fit.samples)
+    ahead = {name: one_step_without(sea.fit, named(name)) for name in sorted(sea.names & {*ORDINARY})}
+    shown = [
+        name
+        for name, lost in ahead.items()
+        if lost and lost[0] > least + charge * fitter.free_parameters(frozenset({name}))
+    ]
+    return is_real(frozenset(shown))
 
 
 def _needs_forces(fitter: Fitter, sea: Explanation) -> bool:
