@@ -67,6 +67,7 @@ def test_a_turn_is_apart_and_what_stays_is_not(extra: Extra, is_apart: bool) -> 
         assert ENDS - 2.0 < end < ENDS + 1.5 * pieces.PIECE
 
 
+@pytest.mark.long
 def test_a_sensor_that_was_silent_for_a_while_is_no_stretch_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(apart, "_with_an_effect", lambda *_: None)
     dive = hidden_dive(turning, duration=250.0)
@@ -75,6 +76,7 @@ def test_a_sensor_that_was_silent_for_a_while_is_no_stretch_apart(monkeypatch: p
     assert BEGINS - pieces.PIECE < start < end < ENDS + 1.5 * pieces.PIECE
 
 
+@pytest.mark.long
 def test_what_an_effect_would_explain_is_not_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     short = short_runs([hidden_dive(turning, duration=250.0)])
     assert short is not None
