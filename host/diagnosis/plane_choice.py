@@ -99,7 +99,7 @@ def likelier_first(
     on_progress("what every vehicle has")
     whole = at_the_outset(leading.fitter)
     if whole is not None and says_all(leading.fitter, whole):
-        return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
+        return _begun_with([leading, *others], whole)
     one = None if whole is None else one_that_says_all(leading.fitter, whole, jobs)
     seen = _among_waves(found)
     if whole is not None and one is None and not is_over():
@@ -115,7 +115,7 @@ def likelier_first(
         on_progress("what every vehicle has, in the waves")
         return _in_a_swell(seen, whole)
     if whole is not None and is_over():
-        return [way._replace(outset=own) for way, own in _as_seen_by([leading, *others], whole)]
+        return _begun_with([leading, *others], whole)
     if whole is not None and (astray := _astray([leading, *others], whole, on_progress)):
         return astray
     if may_leave_out and whole is not None and leading.fitter.excess(whole.fit) > BENT:
@@ -123,6 +123,8 @@ def likelier_first(
         short = short_runs(leading.recordings, whole)
         if short is not None and (apart := stretches_apart(short, jobs, as_most_tell=True).spans):
             return _without(leading, apart, on_progress, jobs)
+        if is_over():
+            return _begun_with([leading, *others], whole)
     if plain is not None and whole is not None and not is_over():
         # What goes with time or depth may follow what water does at random: then it leads nowhere.
         hull = plain if whole.names.isdisjoint({*SCANS, *DRIVE, *LEADING_FORMS}) else whole
@@ -155,7 +157,7 @@ def _at_speeds_or_in_short_runs(
     if fitter.excess(whole.fit) > LOST:
         whole = at_several_speeds(fitter, whole)
     if says_all(fitter, whole):
-        return [way._replace(outset=own) for way, own in _as_seen_by(found, whole)], whole
+        return _begun_with(found, whole), whole
     if not may_leave_out or fitter.excess(whole.fit) < MUCH:
         return [], whole
     return _in_short_runs(found, whole, on_progress, jobs)
@@ -178,7 +180,7 @@ def _in_short_runs(
     if instead is not None:
         whole = min(whole, leading.fitter.refitted(instead), key=lambda e: e.bic)
         if says_all(leading.fitter, whole):
-            return [way._replace(outset=own) for way, own in _as_seen_by(found, whole)], whole
+            return _begun_with(found, whole), whole
     taught = partial(followed_shortly, whole=whole, short=short)
     return _led(found, whole, taught, on_progress, jobs), whole
 
@@ -187,6 +189,11 @@ def _without(leading: Way, apart: list[Span], on_progress: Callable[[str], None]
     """The ways without these stretches, the likelier first."""
     rest = likelier_first(ways(without(leading.recordings, apart, APART)), on_progress, jobs)
     return [way._replace(apart=tuple(apart)) for way in rest]
+
+
+def _begun_with(found: list[Way], whole: Explanation) -> list[Way]:
+    """The ways, the likelier first, to begin with this set."""
+    return [way._replace(outset=own) for way, own in _as_seen_by(found, whole)]
 
 
 def _as_seen_by(found: list[Way], one: Explanation) -> list[tuple[Way, Explanation]]:

@@ -11,6 +11,7 @@ from hidden_dive import Extra, hidden_dive, nothing
 from host.catalogue import structure_of
 from host.diagnosis import plane_choice
 from host.diagnosis.diagnose import Judged, _apart, _on_all
+from host.diagnosis.fits.patience import patience
 from host.diagnosis.plane_choice import Way, likelier_first
 from host.diagnosis.proof.scoring import Misfit
 from host.diagnosis.proof.verdict import Verdict
@@ -122,6 +123,16 @@ def test_little_that_is_left_is_no_turn_and_what_runs_away_explains_no_piece(
     assert np.isinf(apart._of_some(short.fitter, np.arange(6), whole)[1]).all()
     monkeypatch.setattr(apart, "_taught_by", lambda *_: pytest.fail("nothing is taught by such a hull"))
     assert apart._as_most_tell(short.fitter, short.whole, 1) is None
+
+
+def test_no_more_pieces_are_drawn_once_the_search_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[Any] = []
+    monkeypatch.setattr(apart, "_of_some", lambda *given: drawn.append(given))
+    fitter: Any = SimpleNamespace(recordings=[None] * 12, excess=lambda _: 2.0 * apart.BENT)
+    whole: Any = SimpleNamespace(fit=None)
+    with patience(0.0):
+        assert apart._as_most_tell(fitter, whole, 1) is None
+    assert len(drawn) == 1
 
 
 def test_short_recordings_several_and_alarms_are_taken_whole() -> None:

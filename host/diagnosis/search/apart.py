@@ -19,6 +19,7 @@ from host.catalogue.unknown import IN_LAYERS
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LITTLE
+from host.diagnosis.fits.patience import is_over
 from host.diagnosis.fits.prospects import form_gains
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.search.outset import FAR_LESS, IN_TIME, says_all
@@ -120,8 +121,8 @@ def _without_the_worst(fitter: Fitter, whole: Explanation) -> _Taught | None:
 def _as_most_tell(fitter: Fitter, whole: Explanation, jobs: int) -> _Taught | None:
     """The pieces that most of them explain together, where these leave far less than all; else None.
 
-    Something may be left of them, that acts on all. Not by a hull that hardly heaves: what each piece begins
-    with then does for whatever pushes it.
+    Something may be left of them, that acts on all. None where it takes too long, nor by a hull that hardly
+    heaves: what each piece begins with then does for whatever pushes it.
     """
     pieces, left = fitter.recordings, fitter.excess(whole.fit)
     if left < BENT:
@@ -129,8 +130,12 @@ def _as_most_tell(fitter: Fitter, whole: Explanation, jobs: int) -> _Taught | No
     rng, count = np.random.default_rng(0), max(LEAST_DRAWN, ceil(DRAWN * len(pieces)))
     most = ceil((1.0 - MOST) * len(pieces))
     draws = [np.sort(rng.choice(len(pieces), count, replace=False)) for _ in range(DRAWS)]
+    found: list[tuple[Explanation, Array]] = []
     with Workers(fitter, jobs) as workers:
-        found: list[tuple[Explanation, Array]] = workers.results([(_of_some, (d, whole)) for d in draws])
+        for k in range(0, DRAWS, jobs):
+            found += workers.results([(_of_some, (drawn, whole)) for drawn in draws[k : k + jobs]])
+            if is_over():
+                return None
     best, by_best = min(found, key=lambda each: float(np.sort(each[1])[:most].mean()))
     if not np.isfinite(by_best).any():
         return None
@@ -141,6 +146,8 @@ def _as_most_tell(fitter: Fitter, whole: Explanation, jobs: int) -> _Taught | No
             break
         best = _taught_by([pieces[k] for k in kept], best)
         by_best = _left_by(pieces, best)
+        if is_over():
+            return None
     followed = _not_far_worse(pieces, by_best)
     best = _taught_by(followed, best)
     is_less = Fitter(followed).excess(best.fit) < FAR_LESS * left and has_usual_heave(best.fit.end)
