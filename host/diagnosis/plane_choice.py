@@ -92,6 +92,7 @@ def likelier_first(
     any, with all that where it is likelier; else all that every vehicle has, where random forces account for
     what is left, or next to nothing is; else single effects. Where these forces explain far more without
     accounting for it all, they tell which way. A plane that moved more often than its rows show leaves one.
+    A filter that leads the hull where no free run does is asked before what may lead, and again beside it.
 
     may_leave_out  whether stretches may be left out without which nothing is left beside it
     """
@@ -101,8 +102,9 @@ def likelier_first(
     if whole is not None and says_all(leading.fitter, whole):
         return _begun_with([leading, *others], whole)
     one = None if whole is None else one_that_says_all(leading.fitter, whole, jobs)
-    seen = _among_waves(found)
+    seen, asked = _among_waves(found), None
     if whole is not None and one is None and not is_over():
+        asked = whole
         if not seen and (led := _led_by_a_filter([leading, *others], whole, whole, on_progress, jobs)):
             return led
         told, whole = _at_speeds_or_in_short_runs([leading, *others], whole, on_progress, jobs, may_leave_out)
@@ -125,7 +127,7 @@ def likelier_first(
             return _without(leading, apart, on_progress, jobs)
         if is_over():
             return _begun_with([leading, *others], whole)
-    if plain is not None and whole is not None and not is_over():
+    if plain is not None and whole is not None and whole is not asked and not is_over():
         # What goes with time or depth may follow what water does at random: then it leads nowhere.
         hull = plain if whole.names.isdisjoint({*SCANS, *DRIVE, *LEADING_FORMS}) else whole
         if led := _led_by_a_filter([leading, *others], hull, whole, on_progress, jobs):

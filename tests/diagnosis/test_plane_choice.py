@@ -49,7 +49,15 @@ def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(plane_choice, "_led", lambda *_: [])
     monkeypatch.setattr(plane_choice, "_pushed_about", lambda *_: [])
     assert order(moved, held) == [0, 1]
+    asked: list[Any] = []
+    monkeypatch.setattr(plane_choice, "_led", lambda _, free, *__: asked.append(free) or [])
     assert likelier_first([held], lambda _: None, 1)[0].outset is whole
+    assert asked == [whole]  # again only beside what leads
+    leads: Any = SimpleNamespace(bic=-11.0, names=MANY | {"ballast_change"}, leaves_white=False, fit=0.1)
+    monkeypatch.setattr(plane_choice, "beside_what_leads", lambda *_: leads)
+    likelier_first([held], lambda _: None, 1)
+    assert asked == [whole, whole, leads]
+    monkeypatch.setattr(plane_choice, "beside_what_leads", lambda _, one, __: one)
     pushed: Any = SimpleNamespace(bic=-30.0)
     monkeypatch.setattr(plane_choice, "_pushed_about", lambda ways, *_: [ways[0]._replace(pushed=pushed)])
     (first,) = likelier_first([held], lambda _: None, 1)
