@@ -207,9 +207,9 @@ def _with_heave_swapped(point: Point) -> list[Point]:
     return [replace(point, parameters=point.structure.clipped(moved)) for moved in swapped]
 
 
-def has_usual_heave(point: Point) -> bool:
+def has_usual_heave(point: Point, slowest: float = IDLE) -> bool:
     """Whether heave neither follows the plane at once nor hardly moves, and does not do the speed's work."""
-    return bool(INSTANT < point.parameters[A1] < IDLE and point.parameters[U0] > STANDING)
+    return bool(INSTANT < point.parameters[A1] < slowest and point.parameters[U0] > STANDING)
 
 
 def has_damped_pitch(point: Point) -> bool:

@@ -127,17 +127,16 @@ def test_what_gains_beside_the_forces_joins_unless_it_is_too_much_or_of_no_catal
     assert (None if found is None else {*found.names}) == joined
 
 
-def test_what_joined_too_soon_goes_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_joined_too_soon_goes_again() -> None:
     worth = {"pitch_bias": -5.0, "vertical_current": 30.0, "actuator_rate_limit": -9.0}
     bic = lambda names: -sum(worth.get(name, 1.0) for name in names)  # noqa: E731
-    less = lambda _, one, name: replace(one, names=one.names - {name}, bic=bic(one.names - {name}))  # noqa: E731
-    monkeypatch.setattr(led_by_filter, "_less", less)
+    less = lambda one, names: replace(one, names=names, bic=bic(names))  # noqa: E731
     search: Any = SimpleNamespace(
-        workers=SimpleNamespace(results=lambda tasks: [less(None, *given) for _, given in tasks])
+        workers=SimpleNamespace(results=lambda tasks: [less(*given) for _, given in tasks])
     )
     names = frozenset({*worth, "munk_moment"})
     sea: Any = Explanation(names, begun(np.inf)[0].root.fit, bic(names))
-    found = led_by_filter._without_the_idle(search, sea, frozenset({"munk_moment"}))
+    found = led_by_filter._without_what_joined_too_soon(search, sea, frozenset({"munk_moment"}))
     assert found.names == {"munk_moment", "vertical_current"}
 
 
@@ -186,7 +185,7 @@ def test_a_logger_that_reads_between_readings_is_led_as_well_but_none_that_a_fre
     monkeypatch.setattr(led_by_filter, "_continued", lambda _: sea)
     monkeypatch.setattr(led_by_filter, "_among_look_alikes", lambda _, one: one)
     monkeypatch.setattr(led_by_filter, "_with_what_gains", lambda _, one: one)
-    monkeypatch.setattr(led_by_filter, "_without_the_idle", lambda _, one, __: one)
+    monkeypatch.setattr(led_by_filter, "_without_what_joined_too_soon", lambda _, one, __: one)
     monkeypatch.setattr(led_by_filter, "_shows_a_hull", lambda *_: True)
     monkeypatch.setattr(led_by_filter, "_needs_forces", lambda *_: away)
     assert (led(fitter, whole) is sea) == is_led

@@ -25,20 +25,19 @@ from host.diagnosis.recordings.spans import led_excerpt
 from host.diagnosis.search.continuation import continued
 from host.diagnosis.search.outset import IN_TIME, LOST
 from host.diagnosis.search.whole_vehicle import is_real
-from host.dynamics.equations import NAMES
 from host.likelihood.gauss_newton import Point
-from host.likelihood.valleys import INSTANT, STANDING, has_damped_pitch, look_alikes
+from host.likelihood.valleys import has_damped_pitch, has_usual_heave, look_alikes
 
 if TYPE_CHECKING:
     from host.diagnosis.search.search import Search
 
-MOST_FORCES = 0.2  # of the variance of all force: less than turbulence does to a small hull in level flight
+MOST_FORCES = 0.2  # of the variance of all force: turbulence of 5 mm/s made an eighth of it on a small hull
 MOST_LEFT = 3.0  # times the noise floor: a sensor that is read between its readings looks smoother than it is
 NOTHING_ELSE = 0.03  # of BIC a sample, that anything may gain beside the forces: what a free run lost is more
 FORCED = 0.25  # of BIC a sample, by which forces lead a free run away, whatever goes with time or depth
 MOST_MORE, MOST_LARGE = 4, 2  # effects that join beside the forces, and those of them that gain so much
 PROMISING = 2  # that are tried for each
-SLOW = -0.03  # 1/s, of a1: a hull of ten metres at half a metre a second
+SLOW = -0.03  # 1/s, of a1: the heave damping of ten metres of hull at half a metre a second
 PASSING = frozenset({*SCANS, *DRIVE, *IN_TIME})  # of these each may follow a little of what forces do
 
 
@@ -60,16 +59,17 @@ def led_by_a_filter(
     if sea is None or not lead_away(fitter, free, sea, FORCED):
         return None
     usual = whole.names | {*ORDINARY}
-    lean = _among_look_alikes(search, _without_the_idle(search, sea, usual))
+    lean = _among_look_alikes(search, _without_what_joined_too_soon(search, sea, usual))
     grown = _with_what_gains(search, lean)
     if grown is None:
         return None
-    sea = _without_the_idle(search, grown, usual)
+    sea = _without_what_joined_too_soon(search, grown, usual)
     if (sea.fit.noise[2:4] > MOST_FORCES * np.square(fitter.accelerations)).any():
         return None
     if not _are_needed(search, sea, [name for name in sea.names - whole.names if name in DRIVE]):
         return None
-    is_hull = _is_damped(sea) and _shows_a_hull(fitter, sea)
+    is_damped = has_usual_heave(sea.fit.end, SLOW) and has_damped_pitch(sea.fit.end)
+    is_hull = is_damped and _shows_a_hull(fitter, sea)
     return sea if is_hull and fitter.excess(sea.fit) < MOST_LEFT and _needs_forces(fitter, sea) else None
 
 
@@ -100,19 +100,21 @@ def _followed(fitter: Fitter, names: Names, start: Point) -> Explanation:
     return fitter.explained(names, fitter.carried_on(start))
 
 
-def _without_the_idle(search: "Search", sea: Explanation, usual: Names) -> Explanation:
+def _without_what_joined_too_soon(search: "Search", sea: Explanation, usual: Names) -> Explanation:
     """The same less what is not usual and does not pay: it joined before what it did the work of."""
     while more := sorted(sea.names - usual):
-        fewer: list[Explanation] = search.workers.results([(_less, (sea, name)) for name in more])
-        best = min(fewer, key=lambda e: e.bic)
+        best = min(_each_without(search, sea, more), key=lambda e: e.bic)
         if best.bic > sea.bic:
             break
         sea = best
     return sea
 
 
-def _less(fitter: Fitter, sea: Explanation, name: str) -> Explanation:
-    return fitter.reduced(sea, sea.names - {name})
+def _each_without(search: "Search", sea: Explanation, members: list[str]) -> list[Explanation]:
+    """The set less each of these, fitted to the end, forces and all: held, these lead elsewhere."""
+    tasks: list[Task] = [(Fitter.reduced, (sea, sea.names - {name})) for name in members]
+    found: list[Explanation] = search.workers.results(tasks)
+    return found
 
 
 def _with_what_gains(search: "Search", sea: Explanation) -> Explanation | None:
@@ -124,7 +126,7 @@ def _with_what_gains(search: "Search", sea: Explanation) -> Explanation | None:
     least = margin(sea) + log(sea.fit.samples)
     much = max(least, NOTHING_ELSE * sea.fit.samples)
     large = 0
-    for _ in range(MOST_MORE + 1):
+    for _ in range(MOST_MORE):
         gains = search.gains(sea)
         if max(form_gains(search.fitter, sea).values()) > max(much, *gains.values()):
             return None
@@ -148,14 +150,8 @@ def _are_needed(search: "Search", sea: Explanation, drive: list[str]) -> bool:
     """
     if sea.leaves_white:
         return True
-    fewer: list[Explanation] = search.workers.results([(_less, (sea, name)) for name in drive])
-    return all(one.bic > sea.bic + NOTHING_ELSE * sea.fit.samples for one in fewer)
-
-
-def _is_damped(sea: Explanation) -> bool:
-    """Whether it damps its pitching, and its heave, if that of a large one slowly."""
-    speed, heave = sea.fit.parameters[NAMES.index("u0")], sea.fit.parameters[NAMES.index("a1")]
-    return bool(INSTANT < heave < SLOW and speed > STANDING) and has_damped_pitch(sea.fit.end)
+    much = NOTHING_ELSE * sea.fit.samples
+    return all(fewer.bic > sea.bic + much for fewer in _each_without(search, sea, drive))
 
 
 def _shows_a_hull(fitter: Fitter, sea: Explanation) -> bool:
