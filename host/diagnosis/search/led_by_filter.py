@@ -20,6 +20,7 @@ from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import MUCH, margin
 from host.diagnosis.fits.prospects import form_gains
 from host.diagnosis.fits.sea_fits import lead_away, with_sea
+from host.diagnosis.fits.starts import scanned
 from host.diagnosis.fits.workers import Task, Workers
 from host.diagnosis.recordings.spans import led_excerpt
 from host.diagnosis.search.continuation import continued
@@ -37,6 +38,7 @@ NOTHING_ELSE = 0.03  # of BIC a sample, that anything may gain beside the forces
 FORCED = 0.25  # of BIC a sample, by which forces lead a free run away, whatever goes with time or depth
 MOST_MORE, MOST_LARGE = 4, 2  # effects that join beside the forces, and those of them that gain so much
 PROMISING = 2  # that are tried for each
+PLACE = "depth_sensor_lever_arm"
 SLOW = -0.03  # 1/s, of a1: the heave damping of ten metres of hull at half a metre a second
 PASSING = frozenset({*SCANS, *DRIVE, *IN_TIME})  # of these each may follow a little of what forces do
 
@@ -60,7 +62,7 @@ def led_by_a_filter(
         return None
     usual = whole.names | {*ORDINARY}
     lean = _among_look_alikes(search, _without_what_joined_too_soon(search, sea, usual))
-    grown = _with_what_gains(search, lean)
+    grown = _with_what_gains(search, _with_the_place(search, lean))
     if grown is None:
         return None
     sea = _without_what_joined_too_soon(search, grown, usual)
@@ -85,7 +87,7 @@ def _continued(search: "Search") -> Explanation | None:
     if (found := led.steered) is None:
         return None
     start = fitter.carried_over(found).with_noise(found.fit.noise)
-    return _followed(fitter, found.names, start)
+    return _followed(fitter, found.names, scanned(fitter, start))
 
 
 def _among_look_alikes(search: "Search", sea: Explanation) -> Explanation:
@@ -115,6 +117,17 @@ def _each_without(search: "Search", sea: Explanation, members: list[str]) -> lis
     tasks: list[Task] = [(Fitter.reduced, (sea, sea.names - {name})) for name in members]
     found: list[Explanation] = search.workers.results(tasks)
     return found
+
+
+def _with_the_place(search: "Search", sea: Explanation) -> Explanation:
+    """The same with a depth sensor off the centre, if that pays: a hull bent without it foretells nothing."""
+    if PLACE in sea.names:
+        return sea
+    names = sea.names | {PLACE}
+    points = [search.fitter.point(names, sea, PLACE, np.array(probe)) for probe in named(PLACE).probes]
+    found: list[Explanation] = search.workers.results([(_followed, (names, at)) for at in points])
+    best = min(found, key=lambda e: e.bic)
+    return best if best.bic < sea.bic - margin(sea) - log(sea.fit.samples) else sea
 
 
 def _with_what_gains(search: "Search", sea: Explanation) -> Explanation | None:
