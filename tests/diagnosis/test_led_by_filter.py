@@ -111,6 +111,14 @@ class Stub:
         ([{"actuator_delay": 900.0}, {"ballast_change": 1.0}], 0.0, {"actuator_delay"}),
         ([{"depth_sensor_lever_arm": 60.0}, {}], 0.0, {"depth_sensor_lever_arm"}),  # it is there throughout
         ([{"ballast_change": 60.0}], 0.0, set()),  # what passes may follow the forces
+        ([{"fin_stall": 60.0}], 0.0, set()),
+        ([{"actuator_rate_limit": 60.0}], 0.0, set()),
+        # A servo that is late is also slow.
+        (
+            [{"actuator_delay": 900.0}, {"actuator_rate_limit": 60.0, "fin_stall": 80.0}, {}],
+            0.0,
+            {"actuator_delay", "actuator_rate_limit"},
+        ),
         ([{"actuator_delay": 900.0}], 950.0, None),  # a form promises more
         ([{"actuator_delay": 900.0}, {"ballast_change": 900.0}, {"internal_wave": 900.0}], 0.0, None),
     ],
@@ -141,16 +149,55 @@ def test_what_joined_too_soon_goes_again() -> None:
 
 
 @pytest.mark.parametrize(
-    ("worth", "is_white", "are_needed"), [(900.0, False, True), (40.0, False, False), (40.0, True, True)]
+    ("worth", "pays"), [((900.0, 40.0), True), ((40.0, 900.0), True), ((20.0, 12.0), False)]
+)
+def test_the_place_of_the_depth_sensor_is_told_from_where_the_hull_moves_as_before(
+    worth: tuple[float, float], pays: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(led_by_filter, "margin", lambda _: 14.0)
+    fit = SimpleNamespace(samples=3000)
+    sea: Any = SimpleNamespace(names=frozenset({"munk_moment"}), fit=fit, bic=0.0)
+    search: Any = SimpleNamespace(
+        fitter=SimpleNamespace(point=lambda names, _, __, probe: (names, float(probe[0]))),
+        workers=SimpleNamespace(
+            results=lambda tasks: [
+                SimpleNamespace(bic=-one, begun=given) for one, (_, given) in zip(worth, tasks, strict=True)
+            ]
+        ),
+    )
+    found: Any = led_by_filter._with_the_place(search, sea)
+    assert (found is not sea) == pays
+    if pays:
+        names, (_, forward) = found.begun
+        assert names == {"munk_moment", "depth_sensor_lever_arm"}
+        assert (forward > 0) == (worth[0] > worth[1])
+
+
+def test_the_place_of_the_depth_sensor_is_asked_once() -> None:
+    sea: Any = SimpleNamespace(names=frozenset({"depth_sensor_lever_arm"}))
+    search: Any = None
+    assert led_by_filter._with_the_place(search, sea) is sea
+
+
+@pytest.mark.parametrize(
+    ("worth", "is_white", "are_needed"),
+    [
+        ((900.0,), False, True),
+        ((40.0,), False, False),
+        ((40.0,), True, True),
+        ((900.0, 40.0), False, True),  # beside what clearly does a little more may
+        ((40.0, 50.0), False, False),
+    ],
 )
 def test_what_keeps_the_plane_back_is_worth_much_where_no_white_noise_tells_it(
-    worth: float, is_white: bool, are_needed: bool
+    worth: tuple[float, ...], is_white: bool, are_needed: bool
 ) -> None:
     fit = SimpleNamespace(samples=3000)
     sea: Any = SimpleNamespace(
         names=frozenset({"actuator_saturation"}), fit=fit, bic=0.0, leaves_white=is_white
     )
-    search: Any = SimpleNamespace(workers=SimpleNamespace(results=lambda _: [SimpleNamespace(bic=worth)]))
+    fewer = [SimpleNamespace(bic=lost) for lost in worth]
+    search: Any = SimpleNamespace(workers=SimpleNamespace(results=lambda _: fewer))
     assert led_by_filter._are_needed(search, sea, ["actuator_saturation"]) == are_needed
 
 
@@ -184,6 +231,7 @@ def test_a_logger_that_reads_between_readings_is_led_as_well_but_none_that_a_fre
     monkeypatch.setattr(fitter, "excess", excess)
     monkeypatch.setattr(led_by_filter, "_continued", lambda _: sea)
     monkeypatch.setattr(led_by_filter, "_among_look_alikes", lambda _, one: one)
+    monkeypatch.setattr(led_by_filter, "_with_the_place", lambda _, one: one)
     monkeypatch.setattr(led_by_filter, "_with_what_gains", lambda _, one: one)
     monkeypatch.setattr(led_by_filter, "_without_what_joined_too_soon", lambda _, one, __: one)
     monkeypatch.setattr(led_by_filter, "_shows_a_hull", lambda *_: True)

@@ -16,6 +16,7 @@ from host.diagnosis.fits.prospects import probed, whitened_at
 from host.diagnosis.fits.starts import (
     SLUGGISH,
     _with_depth_moved_alike,
+    scanned,
     with_other_moments,
     with_usual_pitch,
 )
@@ -91,6 +92,22 @@ def test_a_moment_that_lay_between_the_stretches_fitted_first_is_found_on_all_of
     again = fitter.refitted(unsettled)
     assert again.fit.parameters[index] == pytest.approx(WEAKENED_AT, abs=0.1)
     assert 0.02 < deviations(fitter, again)["effectiveness_time"] < 0.1
+
+
+def test_a_moment_is_found_under_forces_as_well() -> None:
+    gusts = np.random.default_rng(8).standard_normal((2, 91))
+
+    def blown(time: float, x: Array, plane: float) -> tuple[float, float, float]:  # noqa: ARG001
+        lost = -0.5 * plane * (time > WEAKENED_AT)
+        force, moment = gusts[:, int(time)] * [0.004, 0.02]
+        return lost * BASE["b1"] + force, lost * BASE["b2"] + moment, 0.0
+
+    fitter, names = Fitter([hidden_dive(blown)]), frozenset({"rudder_effectiveness_change"})
+    late = fitter.point(names, fitter.base, *names, np.array([-0.5, WEAKENED_AT + 40.0]))
+    late = late.with_noise(np.array([*fitter.floor, *(0.05 * np.square(fitter.accelerations))]))
+    found, index = scanned(fitter, late), late.structure.names.index("effectiveness_time")
+    assert found.parameters[index] == pytest.approx(WEAKENED_AT, abs=1.0)
+    assert np.array_equal(np.delete(found.parameters, index), np.delete(late.parameters, index))
 
 
 def test_a_fit_that_ended_in_another_rest_of_the_plane_begins_again_at_the_right_moment() -> None:

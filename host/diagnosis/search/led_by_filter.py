@@ -40,7 +40,9 @@ MOST_MORE, MOST_LARGE = 4, 2  # effects that join beside the forces, and those o
 PROMISING = 2  # that are tried for each
 PLACE = "depth_sensor_lever_arm"
 SLOW = -0.03  # 1/s, of a1: the heave damping of ten metres of hull at half a metre a second
-PASSING = frozenset({*SCANS, *DRIVE, *IN_TIME})  # of these each may follow a little of what forces do
+PASSING = frozenset(
+    {*SCANS, *DRIVE, *IN_TIME, "fin_stall"}
+)  # of these each may follow a little of what forces do
 
 
 def led_by_a_filter(
@@ -133,8 +135,8 @@ def _with_the_place(search: "Search", sea: Explanation) -> Explanation:
 def _with_what_gains(search: "Search", sea: Explanation) -> Explanation | None:
     """The same with what gains beside the forces; None where much does, or a form gains most.
 
-    What passes, or keeps a plane back, must gain as much as no free run lost; what a vehicle has throughout,
-    the place of its depth sensor, say, as much as anywhere.
+    What passes, or keeps a plane back, must gain as much as no free run lost, unless another keeps it back;
+    what a vehicle has throughout as much as anywhere.
     """
     least = margin(sea) + log(sea.fit.samples)
     much = max(least, NOTHING_ELSE * sea.fit.samples)
@@ -146,7 +148,8 @@ def _with_what_gains(search: "Search", sea: Explanation) -> Explanation | None:
         large += max(gains.values()) > much
         if large > MOST_LARGE:
             return None
-        likely = [name for name in gains if gains[name] > (much if name in PASSING else least)]
+        dear = PASSING - {*DRIVE} if sea.names & {*DRIVE} else PASSING
+        likely = [name for name in gains if gains[name] > (much if name in dear else least)]
         likely = sorted(likely, key=lambda name: -gains[name])[:PROMISING]
         grown = search.workers.results([search.growth(sea, name) for name in likely])
         best: Explanation = min(grown, key=lambda e: e.bic, default=sea)
@@ -157,14 +160,15 @@ def _with_what_gains(search: "Search", sea: Explanation) -> Explanation | None:
 
 
 def _are_needed(search: "Search", sea: Explanation, drive: list[str]) -> bool:
-    """Whether each of what keeps the plane back is worth as much as no free run lost.
+    """Whether of what keeps the plane back one is worth as much as no free run lost.
 
-    Under forces, of several each does a part of another's work.
+    Under forces, each does a part of another's work: a second beside it may do less.
     """
     if sea.leaves_white:
         return True
     much = NOTHING_ELSE * sea.fit.samples
-    return all(fewer.bic > sea.bic + much for fewer in _each_without(search, sea, drive))
+    lost = [fewer.bic - sea.bic for fewer in _each_without(search, sea, drive)]
+    return not lost or max(lost) > much
 
 
 def _shows_a_hull(fitter: Fitter, sea: Explanation) -> bool:
