@@ -26,6 +26,7 @@ from host.diagnosis.proof.scoring import Misfit, foretells, free_run_errors, mis
 from host.diagnosis.proof.slight import is_slight
 from host.diagnosis.proof.unknown_force import UnknownForce, unknown_force
 from host.diagnosis.proof.verdict import Verdict, remaining, verdict_on
+from host.diagnosis.recordings.blended import with_readings_apart
 from host.diagnosis.recordings.sensed import as_sensed
 from host.diagnosis.recordings.spans import Spans, clear_of, divide, excerpt
 from host.diagnosis.recordings.usable import check_usable, noted, with_plane_told
@@ -114,8 +115,8 @@ def diagnose(
 ) -> Diagnosis:
     """Finds what the paper's equations lack on these recordings of one vehicle, on `jobs` cores.
 
-    Spikes are left out first, what is smoother than sensors are gets their noise, and it is asked what the
-    plane did between rows: that is no physics.
+    Spikes are left out first, and rows that only blend two readings; what is smoother than sensors are gets
+    their noise, and it is asked what the plane did between rows: that is no physics.
 
     like  an explanation of a vehicle that this one should resemble: if of many effects, it is begun with
     may_be_quiet  whether recordings that are smoother than sensors are taken as they are
@@ -128,7 +129,7 @@ def diagnose(
     on_progress("base model")
     seen = without_outliers(with_plane_told(recordings))
     check_signs(seen)
-    seen = noted(seen, units_note(seen))
+    seen = noted(with_readings_apart(seen), units_note(seen))
     seen = seen if may_be_quiet else as_sensed(seen)
     with sharing(jobs):
         seen = with_plane_moments(seen, on_progress)

@@ -20,7 +20,7 @@ from host.recordings.recording import Array, Recording
 SIGNIFICANCE = 1e-4
 SEA_DOUBT = 1.5  # no sea is as white and steady as the filter takes it to be
 GROUPS, LEAST_IN_GROUP = 10, 5
-LEAST_SEA = 0.003  # m/s; below it physics left out, not moving water, is what passes for noise
+LEAST_SEA = 0.001  # m/s, of a hull, which follows water in part; below it physics left out
 MOVEMENT_SPAN = 0.5  # s
 FLOOR_DOUBT = 1.3  # times the noise floor, which no sensor keeps to exactly
 FLOOR_SPREAD = 14.0  # over the root of the samples: 4.5 relative deviations of the floor's own estimate
