@@ -129,10 +129,32 @@ def test_what_gains_beside_the_forces_joins_unless_it_is_too_much_or_of_no_catal
     monkeypatch.setattr(led_by_filter, "form_gains", lambda *_: {"unknown_force_w_w": form})
     monkeypatch.setattr(led_by_filter, "margin", lambda _: 6.0)
     monkeypatch.setattr(led_by_filter, "_among_look_alikes", lambda _, sea: sea)
+    monkeypatch.setattr(led_by_filter, "_with_the_place", lambda _, sea: sea)
     sea: Any = Explanation(frozenset(), begun(np.inf)[0].root.fit, 0.0)
     search: Any = Stub(*gains)
     found = led_by_filter._with_what_gains(search, sea)
     assert (None if found is None else {*found.names}) == joined
+
+
+def test_the_place_of_the_depth_sensor_is_asked_once_nothing_gains_much(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(led_by_filter, "form_gains", lambda *_: {"unknown_force_w_w": 0.0})
+    monkeypatch.setattr(led_by_filter, "margin", lambda _: 6.0)
+    monkeypatch.setattr(led_by_filter, "_among_look_alikes", lambda _, sea: sea)
+    asked: list[frozenset[str]] = []
+
+    def placed(_: Search, sea: Explanation) -> Explanation:
+        asked.append(sea.names)
+        return replace(sea, names=sea.names | {"depth_sensor_lever_arm"})
+
+    monkeypatch.setattr(led_by_filter, "_with_the_place", placed)
+    sea: Any = Explanation(frozenset(), begun(np.inf)[0].root.fit, 0.0)
+    search: Any = Stub({"actuator_delay": 900.0}, {"ballast_change": 60.0}, {})
+    found = led_by_filter._with_what_gains(search, sea)
+    assert asked == [frozenset({"actuator_delay"})]
+    assert found is not None
+    assert found.names == {"actuator_delay", "depth_sensor_lever_arm"}
 
 
 def test_what_joined_too_soon_goes_again() -> None:
@@ -231,7 +253,6 @@ def test_a_logger_that_reads_between_readings_is_led_as_well_but_none_that_a_fre
     monkeypatch.setattr(fitter, "excess", excess)
     monkeypatch.setattr(led_by_filter, "_continued", lambda _: sea)
     monkeypatch.setattr(led_by_filter, "_among_look_alikes", lambda _, one: one)
-    monkeypatch.setattr(led_by_filter, "_with_the_place", lambda _, one: one)
     monkeypatch.setattr(led_by_filter, "_with_what_gains", lambda _, one: one)
     monkeypatch.setattr(led_by_filter, "_without_what_joined_too_soon", lambda _, one, __: one)
     monkeypatch.setattr(led_by_filter, "_shows_a_hull", lambda *_: True)

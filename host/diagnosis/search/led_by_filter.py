@@ -64,7 +64,7 @@ def led_by_a_filter(
         return None
     usual = whole.names | {*ORDINARY}
     lean = _among_look_alikes(search, _without_what_joined_too_soon(search, sea, usual))
-    grown = _with_what_gains(search, _with_the_place(search, lean))
+    grown = _with_what_gains(search, lean)
     if grown is None:
         return None
     sea = _without_what_joined_too_soon(search, grown, usual)
@@ -136,13 +136,18 @@ def _with_what_gains(search: "Search", sea: Explanation) -> Explanation | None:
     """The same with what gains beside the forces; None where much does, or a form gains most.
 
     What passes, or keeps a plane back, must gain as much as no free run lost, unless another keeps it back;
-    what a vehicle has throughout as much as anywhere.
+    what a vehicle has throughout as much as anywhere. Where its depth sensor sits is asked once nothing gains
+    much: a hull bent by what does is moved by a sensor that is not there.
     """
     least = margin(sea) + log(sea.fit.samples)
     much = max(least, NOTHING_ELSE * sea.fit.samples)
-    large = 0
+    large, is_placed = 0, False
     for _ in range(MOST_MORE):
         gains = search.gains(sea)
+        if not is_placed and max(gains.values()) <= much:
+            is_placed, bent = True, sea
+            if (sea := _with_the_place(search, bent)) is not bent:
+                continue
         if max(form_gains(search.fitter, sea).values()) > max(much, *gains.values()):
             return None
         large += max(gains.values()) > much
