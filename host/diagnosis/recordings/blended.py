@@ -44,7 +44,9 @@ def with_readings_apart(recordings: list[Recording]) -> list[Recording]:
 def blended_in(pieces: list[Recording]) -> list[str]:
     """The channels of one table, in stretches, in which each row blends two readings."""
     judged = (noise_floor(pieces) > SMOOTH**2) & ~is_quantised(pieces)
-    return [name for name, is_judged in zip(CHANNELS, judged, strict=True) if is_judged and _is(pieces, name)]
+    return [
+        name for name, is_judged in zip(CHANNELS, judged, strict=True) if is_judged and _blends(pieces, name)
+    ]
 
 
 def _apart(recording: Recording, names: list[str]) -> Recording:
@@ -72,7 +74,7 @@ def _every_other(values: Array) -> Array:
     return apart
 
 
-def _is(pieces: list[Recording], name: str) -> bool:
+def _blends(pieces: list[Recording], name: str) -> bool:
     """Whether the noise falls with frequency as that of blended readings, by Whittle's likelihood."""
     known = [np.isfinite(getattr(one, name)) for one in pieces]
     told = [(getattr(one, name)[at], one.rudder[at]) for one, at in zip(pieces, known, strict=True)]

@@ -38,11 +38,10 @@ NOTHING_ELSE = 0.03  # of BIC a sample, that anything may gain beside the forces
 FORCED = 0.25  # of BIC a sample, by which forces lead a free run away, whatever goes with time or depth
 MOST_MORE, MOST_LARGE = 4, 2  # effects that join beside the forces, and those of them that gain so much
 PROMISING = 2  # that are tried for each
-PLACE = "depth_sensor_lever_arm"
+PLACE = "depth_sensor_lever_arm"  # of the depth sensor, which hardly any vehicle has at its centre
 SLOW = -0.03  # 1/s, of a1: the heave damping of ten metres of hull at half a metre a second
-PASSING = frozenset(
-    {*SCANS, *DRIVE, *IN_TIME, "fin_stall"}
-)  # of these each may follow a little of what forces do
+PASSING = frozenset({*SCANS, *DRIVE, *IN_TIME, "fin_stall"})
+"""Of these each may follow a little of what forces do."""
 
 
 def led_by_a_filter(
