@@ -136,7 +136,7 @@ def test_what_gains_beside_the_forces_joins_unless_it_is_too_much_or_of_no_catal
     assert (None if found is None else {*found.names}) == joined
 
 
-def test_the_place_of_the_depth_sensor_is_asked_once_nothing_gains_much(
+def test_the_place_of_the_depth_sensor_is_asked_once_nothing_else_gains(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(led_by_filter, "form_gains", lambda *_: {"unknown_force_w_w": 0.0})

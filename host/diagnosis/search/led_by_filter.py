@@ -135,18 +135,14 @@ def _with_what_gains(search: "Search", sea: Explanation) -> Explanation | None:
     """The same with what gains beside the forces; None where much does, or a form gains most.
 
     What passes, or keeps a plane back, must gain as much as no free run lost, unless another keeps it back;
-    what a vehicle has throughout as much as anywhere. Where its depth sensor sits is asked once nothing gains
-    much: a hull bent by what does is moved by a sensor that is not there.
+    what a vehicle has throughout as much as anywhere. Where its depth sensor sits is asked once nothing else
+    gains: a hull bent by what does is moved by a sensor that is not there.
     """
     least = margin(sea) + log(sea.fit.samples)
     much = max(least, NOTHING_ELSE * sea.fit.samples)
     large, is_placed = 0, False
     for _ in range(MOST_MORE):
         gains = search.gains(sea)
-        if not is_placed and max(gains.values()) <= much:
-            is_placed, bent = True, sea
-            if (sea := _with_the_place(search, bent)) is not bent:
-                continue
         if max(form_gains(search.fitter, sea).values()) > max(much, *gains.values()):
             return None
         large += max(gains.values()) > much
@@ -157,8 +153,11 @@ def _with_what_gains(search: "Search", sea: Explanation) -> Explanation | None:
         likely = sorted(likely, key=lambda name: -gains[name])[:PROMISING]
         grown = search.workers.results([search.growth(sea, name) for name in likely])
         best: Explanation = min(grown, key=lambda e: e.bic, default=sea)
-        if best.bic > sea.bic - least:
-            break  # what a step foretold was not there
+        if best.bic > sea.bic - least:  # what a step foretold was not there
+            best = sea if is_placed else _with_the_place(search, sea)
+            is_placed = True
+        if best is sea:
+            break
         sea = _among_look_alikes(search, best)
     return sea
 
