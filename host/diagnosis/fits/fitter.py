@@ -111,7 +111,7 @@ class Fitter(Setting):
         if ahead is not None:
             known = dict(zip(parent.fit.structure.names, ahead[1].tolist(), strict=True))
             moved = replace(start, parameters=np.array([known[own] for own in start.structure.names]))
-            start = max(moved, start, key=self._likelihood)
+            start = max(moved, start, key=self.likelihood)
         starts = [start]
         if not parent.fit.has_process_noise and is_far(self, parent):
             starts.append(guess(self, start, names))
@@ -213,7 +213,7 @@ class Fitter(Setting):
         on = Point(structure, best.parameters, best.initial, best.noise)
         return output_error(on, inputs, free, MOST_ITERATIONS, TOLERANCE, least - MADE_UP_FOR)
 
-    def _likelihood(self, point: Point) -> float:
+    def likelihood(self, point: Point) -> float:
         """The log-likelihood at a point, but for a constant, by a filter where the point has forces."""
         if point.noise[2:].any():
             return likelihood(self, point)

@@ -18,9 +18,8 @@ from host.diagnosis.fits.first_guess import first_guess
 from host.diagnosis.fits.margins import LARGEST_SET
 from host.diagnosis.fits.prospects import probed, whitened_at
 from host.dynamics.propagate import Inputs
-from host.likelihood.filter_error import likelihood_under_forces
 from host.likelihood.gauss_newton import GaussNewton, Mask, Point
-from host.likelihood.output_error import annealed, free_run_cost
+from host.likelihood.output_error import annealed
 from host.likelihood.valleys import A2, A3, B2, SHARING_POLES, has_usual_heave, look_alikes, with_usual_heave
 from host.recordings.recording import Array
 
@@ -110,23 +109,15 @@ def scanned(fitter: "Fitter", start: Point) -> Point:
     """
     names = start.structure.effect_names
     own, free = start.structure.names, fitter.free(names)
-    inputs = fitter.inputs(names, for_filter=bool(start.noise[2:].any()))
     for k in (k for k, name in enumerate(own) if name in start.structure.moments and free[k]):
         first, last = fitter.held[FIRST], fitter.held[LAST]
         for count in SCANS_OF_A_MOMENT:
             apart = (last - first) / (count + 1)
             times = [start.parameters[k], *(first + apart * np.arange(1, count + 1))]
             tried = [_with_value(start, k, float(time)) for time in times]
-            start = min(tried, key=lambda point: _unlikely(point, inputs))
+            start = max(tried, key=fitter.likelihood)
             first, last = start.parameters[k] - apart, start.parameters[k] + apart
     return start
-
-
-def _unlikely(point: Point, inputs: list[Inputs]) -> float:
-    """Less the likelier, of a free run, or under the point's forces."""
-    if point.noise[2:].any():
-        return -likelihood_under_forces(point, inputs)
-    return free_run_cost(point, inputs)
 
 
 def with_other_moments(fitter: "Fitter", end: Explanation) -> list[Point]:
