@@ -16,13 +16,13 @@ SLIP = 1.0037  # of a row: how much longer the rows of the other clock are
 
 
 @cache
-def dive(duration: float = 180.0) -> Recording:
-    return hidden_dive(duration=duration)
+def dive() -> Recording:
+    return hidden_dive(duration=180.0)
 
 
-def drawn(recording: Recording, slip: float = SLIP, swings: bool = False) -> Recording:
+def drawn(recording: Recording, swings: bool = False) -> Recording:
     """The same on another clock: straight lines between readings, and the plane held."""
-    step = slip * recording.step
+    step = SLIP * recording.step
     time = 0.03 + step * np.arange(int(recording.duration / step) - 1)
     rudder = recording.rudder[np.searchsorted(recording.time, time, side="right") - 1]
     return replace(

@@ -22,6 +22,16 @@ def test_the_right_model_leaves_nothing_where_all_readings_are_rounded() -> None
         assert leftover(fitter, fitter.base).is_nothing
 
 
+@pytest.mark.parametrize(("heave", "is_no_sea"), [(0.0005, True), (0.0017, False)])
+def test_what_moves_a_hull_by_less_than_a_calm_lake_is_no_sea(heave: float, is_no_sea: bool) -> None:
+    """In m/s: 2 mm/s of turbulence moved a small hull by 1.7."""
+    fitter = Fitter([hidden_dive(duration=40.0)])
+    fit = fitter.base.fit
+    force = 2.0 * abs(float(fit.parameters[0])) * heave**2
+    pushed = replace(fitter.base, fit=replace(fit, noise=np.array([*fitter.floor, force, 1e-9])))
+    assert leftover(fitter, pushed).is_no_sea == is_no_sea
+
+
 def test_more_than_the_sensors_show_is_told_of_a_set_that_keeps_no_innovations() -> None:
     fitter = Fitter([hidden_dive(duration=40.0)])
     lean = fitter.base.lean().fit

@@ -65,6 +65,7 @@ def _plane_between_rows(recording: Recording) -> PlaneReadings:
     """What this table tells of a plane that may have stepped at any time between two of its rows."""
     rows = np.flatnonzero(np.isfinite(recording.rudder))
     time, angle = recording.time[rows], recording.rudder[rows]
+    # Of rows half as long every second one is without a reading, so that every step is one that nobody saw.
     return PlaneReadings(time, angle, 0.5 * recording.step, is_doubtful=True)
 
 
