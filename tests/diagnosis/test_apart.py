@@ -54,7 +54,7 @@ def spans_of(recordings: list[Recording]) -> list[Span]:
     ("extra", "is_apart"),
     [
         pytest.param(turning, True, marks=pytest.mark.long),
-        (lightened, False),
+        pytest.param(lightened, False, marks=pytest.mark.long),
         (everywhere, False),
         (nothing, False),
     ],
@@ -142,6 +142,7 @@ def test_short_recordings_several_and_alarms_are_taken_whole() -> None:
     assert spans_of([replace(dive, alarms=(BEGINS,))]) == []
 
 
+@pytest.mark.long
 def test_of_a_long_recording_some_pieces_teach_and_all_are_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     dive = hidden_dive(turning, duration=500.0)
     taught: list[int] = []

@@ -60,6 +60,7 @@ def led(fitter: Fitter, whole: Explanation) -> Explanation | None:
         return led_by_a_filter(search, whole)
 
 
+@pytest.mark.long
 def test_an_unstable_hull_is_led_by_a_filter() -> None:
     fitter, whole = begun(np.inf)
     assert fitter.excess(whole.fit) > LOST

@@ -163,6 +163,7 @@ def test_where_it_leads_nowhere_something_may_have_changed(monkeypatch: pytest.M
     assert not leads_on(fitter, nowhere)
 
 
+@pytest.mark.long
 def test_what_goes_with_the_depth_joins_where_it_promises_most(monkeypatch: pytest.MonkeyPatch) -> None:
     fitter = Fitter([hidden_dive(layer, duration=100.0)])
     whole = at_the_outset(fitter)
@@ -285,6 +286,7 @@ def test_a_form_beside_all_that_every_vehicle_has_must_leave_white_noise(
     assert found.names - real.root.names == ({"unknown_force_w_w"} if is_white else set())
 
 
+@pytest.mark.long
 def test_a_diagnosis_begins_with_it_and_ranks_what_pays(real: Fitter) -> None:
     said: list[str] = []
     found = diagnose(real.recordings, said.append)

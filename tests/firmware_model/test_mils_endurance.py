@@ -42,13 +42,13 @@ def check_against_ud(p, forgetting, count):
             np.testing.assert_allclose(np.array(mils.theta) / std, reference.theta / std, atol=1e-9)
 
 
-@pytest.mark.parametrize(("p", "forgetting", "count"), [(1, 0.97, 100_000), (8, 0.998, 4_000)])
+@pytest.mark.parametrize(("p", "forgetting", "count"), [(1, 0.97, 20_000), (8, 0.998, 4_000)])
 def test_square_root_form_agrees_with_ud_form(p, forgetting, count):
     check_against_ud(p, forgetting, count)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("p", "forgetting"), [(1, 1.0), (8, 0.97), (8, 0.998), (8, 1.0)])
+@pytest.mark.parametrize(("p", "forgetting"), [(1, 0.97), (1, 1.0), (8, 0.97), (8, 0.998), (8, 1.0)])
 def test_square_root_form_agrees_with_ud_form_over_100_000_steps(p, forgetting):
     check_against_ud(p, forgetting, 100_000)
 

@@ -109,7 +109,7 @@ def test_spikes_are_left_out_and_nothing_else(kind: str, share: float, longest: 
         np.testing.assert_array_equal(found, spikes)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=12)
 @given(
     st.sampled_from([0.05, 0.1, 0.2]),
     st.floats(0.02, 0.5),
