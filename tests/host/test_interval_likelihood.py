@@ -70,6 +70,17 @@ def test_noise_beneath_the_rounding_is_found(deviation: float) -> None:
     assert cost <= -log_probability(read - true, STEP, deviation).sum()
 
 
+@given(st.floats(0.001, 1.0), st.floats(-0.2, 0.2), st.sampled_from([0.0, 5.0]), st.integers(0, 2**16))
+def test_no_other_deviation_is_likelier(deviation: float, bias: float, spike: float, seed: int) -> None:
+    errors = np.random.default_rng(seed).normal(bias, deviation, 100) + spike * (np.arange(100) == 50)
+    found, cost = likeliest_deviation(errors, STEP)
+    assert found >= 0.999 * LEAST_DEVIATION * STEP
+    assert cost == pytest.approx(-log_probability(errors, STEP, found).sum())
+    others = np.geomspace(LEAST_DEVIATION * STEP, 20.0, 60)
+    least = min(-log_probability(errors, STEP, other).sum() for other in others)
+    assert cost <= least + 1e-3 * max(1.0, abs(least))
+
+
 def test_readings_that_fit_without_noise_end_at_the_least_deviation() -> None:
     found, cost = likeliest_deviation(np.zeros(100), STEP)
     assert found < 0.2 * STEP
