@@ -129,4 +129,4 @@ def test_two_offsets_give_way_to_one_with_all_that_every_vehicle_has() -> None:
     assert one.bic < two.bic
     assert with_one_offset(search, one) is one
     search, few = searched(bent, "net_buoyancy", "trim_moment")
-    assert with_one_offset(search, few) is few  # a textbook's vehicle: fewest names were asked of it
+    assert with_one_offset(search, few).names == {"rudder_offset"}

@@ -13,6 +13,7 @@ from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.margins import LARGEST_SET, LITTLE, NAMING_MARGIN, ROUGH, margin
 from host.diagnosis.fits.trims import COMPRESSED, retrimmed
 from host.diagnosis.fits.workers import Task
+from host.diagnosis.search.exchange import exchanged
 from host.diagnosis.search.pruning import pruned
 from host.diagnosis.search.whole_vehicle import is_real
 
@@ -109,17 +110,26 @@ def with_constant_buoyancy(search: "Search", best: Explanation) -> Explanation:
 
 
 def with_one_offset(search: "Search", best: Explanation) -> Explanation:
-    """The set with one offset in place of two, where that is likelier with all that every vehicle has.
+    """The set with one offset in place of two, where that is likelier.
 
     Two are free to follow what is lacking; a zero error of the plane, which pushes and turns at once, is not.
+    Beside the one a real vehicle has all that each of them has, and few effects may be others.
     """
-    if len(best.names & {*OFFSETS}) < 2 or not is_real(best.names) or search.root.fit.has_process_noise:
+    if len(best.names & {*OFFSETS}) < 2 or search.root.fit.has_process_noise:
+        return best
+    has_all = is_real(best.names)
+    if not has_all and len(best.names) > LARGEST_SET:
         return best
     search.on_progress("one offset in place of two")
-    ones = search.workers.results([(retrimmed, (best, frozenset({name}))) for name in OFFSETS])
+    tasks: list[Task] = [(retrimmed, (best, frozenset({name}))) for name in OFFSETS]
+    ones = [search.remember(one) for one in search.workers.results(tasks)]
     likely = sorted(ones, key=lambda e: e.bic)[:LIKELY]
-    lean = [pruned(search, search.remember(search.completion(search.remember(one)))) for one in likely]
-    return min([best, *lean], key=lambda e: e.bic)
+    if has_all:
+        found = [pruned(search, search.remember(search.completion(one))) for one in likely]
+    else:
+        near = search.polished_near(likely, best.bic)
+        found = [exchanged(search, one, one.names & {*OFFSETS}) for one in near]
+    return min([best, *found], key=lambda e: e.bic)
 
 
 def with_offset(search: "Search", beam: list[Explanation]) -> list[Explanation]:
