@@ -22,6 +22,7 @@ from host.catalogue.unknown import IN_LAYERS, LEADING_FORMS, WANDERING
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import ROUGHLY, Fitter
 from host.diagnosis.fits.margins import LITTLE, MUCH, ROUGH, margin
+from host.diagnosis.fits.patience import is_over
 from host.diagnosis.fits.prospects import form_gains
 from host.diagnosis.fits.sea_fits import as_filtered, with_sea
 from host.diagnosis.fits.speed_forces import are_by_speed
@@ -275,12 +276,15 @@ def is_enough_beside(search: "Search", sea: Explanation, whole: Explanation) -> 
 def goes_on_from(search: "Search", joint: Explanation) -> bool:
     """Whether many of a set of many pay, or of what else promises to beside them: then no search need begin.
 
-    Or beside a form of unknown physics, where what promises most leaves something and that form white noise.
-    What pays is remembered. Of few, each alone tells more; and where something is left, a leading effect may.
+    Nor where there is no time for one, nor beside a form of unknown physics, where what promises most leaves
+    something and that form white noise. What pays is remembered. Of few, each alone tells more; and where
+    something is left, a leading effect may.
     """
     search.on_progress("what every vehicle has")
     search.joint.add(joint.names)
     more = with_more(search, search.remember(joint), least=0.0)
+    if is_over():
+        return True
     if (other := _in_another_valley(search, joint)) is not None:
         more = min(more, with_more(search, other, least=0.0), key=lambda e: e.bic)
     if not (more.leaves_white or search.fitter.excess(more.fit) < LITTLE):

@@ -92,7 +92,7 @@ class Search:
             return self._with_what_a_part_hid(found)
         if self.outset is not None and goes_on_from(self, self.outset):
             found = self._concluded()
-            if min(e.bic for e in self.singles()) > found.bic + ROUGH:  # else many may do one's work
+            if is_over() or min(e.bic for e in self.singles()) > found.bic + ROUGH:  # else many do one's work
                 return found
             self.alone = self.alone_so_far()
         beam_search(self)

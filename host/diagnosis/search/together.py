@@ -103,7 +103,7 @@ def with_more(search: "Search", best: Explanation, least: float = LITTLE) -> Exp
     """The set with what else promises most, as long as more than the least is left and it helps."""
     left = search.fitter.excess(best.fit)
     for _ in range(MOST_BESIDE):
-        if left < least:
+        if left < least or is_over():
             break
         found = search.workers.results(_more(search, best))
         near = search.polished_near(found, min((e.bic for e in found), default=inf))
