@@ -3,37 +3,33 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
-from typing import NamedTuple
 
 import numpy as np
 
-from host.catalogue import BY_NAME, UNKNOWN, named
+from host.catalogue import BY_NAME
 from host.diagnosis.disturbances.seas import Explained, Waves, evidence
 from host.diagnosis.explain import explain
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
-from host.diagnosis.fits.leftover import Leftover
 from host.diagnosis.fits.margins import LARGEST_SET, NAMING_MARGIN
 from host.diagnosis.fits.patience import is_over, was_cut
-from host.diagnosis.fits.sea_fits import WAVES, again_in_waves, again_under_forces, with_regular_waves
+from host.diagnosis.fits.sea_fits import again_in_waves, again_under_forces, with_regular_waves
 from host.diagnosis.fits.workers import Workers, sharing
+from host.diagnosis.judge import Judged, NamedEffect, horizon_of, judge
 from host.diagnosis.plane_choice import Way, is_likelier, likelier_first, ways
 from host.diagnosis.plane_moments import with_plane_moments
 from host.diagnosis.proof.deviations import deviations
 from host.diagnosis.proof.locate import Location, locate
 from host.diagnosis.proof.minute import LEAST_ANGLE, minute_in, unresolved_in
-from host.diagnosis.proof.scoring import Misfit, foretells, free_run_errors, misfit
-from host.diagnosis.proof.slight import is_slight
+from host.diagnosis.proof.scoring import Misfit, free_run_errors
 from host.diagnosis.proof.unknown_force import UnknownForce, unknown_force
-from host.diagnosis.proof.verdict import Verdict, remaining, verdict_on
+from host.diagnosis.proof.verdict import Verdict, remaining
 from host.diagnosis.recordings.blended import with_readings_apart
 from host.diagnosis.recordings.sensed import as_sensed
-from host.diagnosis.recordings.spans import Spans, clear_of, divide, excerpt
+from host.diagnosis.recordings.spans import divide, excerpt
 from host.diagnosis.recordings.usable import check_usable, noted, with_plane_told
 from host.diagnosis.search.candidates import eligible
-from host.diagnosis.search.exchange import twins
 from host.diagnosis.search.search import Search
-from host.diagnosis.search.unknown_physics import known_in, without_unknown
 from host.diagnosis.search.whole_vehicle import beside_all, in_the_valley_of, widened
 from host.dynamics.equations import NAMES, Slot
 from host.identification.identifiability import ambiguity, left_open
@@ -43,27 +39,8 @@ from host.recordings.left_out import told as spans_told
 from host.recordings.outliers import without_outliers
 from host.recordings.recording import Array, Recording
 
-HORIZON = 5.0  # s
-MOST_WORTH = 1e9  # of BIC: without some effects the equations run away
 CUT_SHORT = "The search was ended before it had asked all that it might: --minutes lets it go on for longer."
 Ranking = list[tuple[str, float]]
-SLOTS: tuple[Slot, ...] = ("heave", "pitch", "kinematics", "surge", "actuator", "sensor", "environment")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NamedEffect:
-    """One effect of the answer.
-
-    delta_bic     what the information criterion loses without it
-    heldout_gain  share of the held-out squared error that returns without it
-    twins         effects that would explain the recording as well in its place
-    """
-
-    name: str
-    delta_bic: float
-    heldout_gain: float = 0.0
-    coefficients: dict[str, tuple[float, float, str]] = field(default_factory=dict)
-    twins: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,16 +70,6 @@ class Diagnosis:
     has_sea: bool
     bic: float
     std: dict[str, float] = field(default_factory=dict)
-
-
-class Judged(NamedTuple):
-    """What the held-out spans say of the base and of the model, what is named, where, and the verdict."""
-
-    before: Misfit
-    after: Misfit
-    effects: list[NamedEffect]
-    verdict: Verdict
-    slots: dict[Slot, float]
 
 
 def diagnose(
@@ -159,7 +126,7 @@ def _diagnosed(
         explained = explain(fitter, workers, on_progress, way, like=like, is_second=is_second)
         again = next((way for way in others if not is_over() and _is_likelier(way, explained)), None)
         if again is None and not is_part:
-            judged = _judge(explained, spans, floor, on_progress)
+            judged = judge(explained, spans, floor, on_progress)
     if again is not None:
         on_progress("the plane between rows")
         second = _diagnosed(again, [], on_progress, jobs, explained.best, _ranking(explained.search), True)
@@ -167,13 +134,13 @@ def _diagnosed(
             return second
         with Workers(fitter, jobs) as workers:
             explained.search.workers = workers
-            judged = _judge(explained, spans, floor, on_progress)
+            judged = judge(explained, spans, floor, on_progress)
     if is_part:
         on_progress("the whole")
         fitter = Fitter(spans.teaching)
         with Workers(fitter, jobs) as workers:
             explained = explain(fitter, workers, on_progress, way, explained)
-            judged = _judge(explained, spans, floor, on_progress)
+            judged = judge(explained, spans, floor, on_progress)
     best, search, left, waves, _ = explained
     on_progress("final fit on everything")
     base = _refitted(search.base, recordings)
@@ -208,7 +175,7 @@ def _diagnosed(
         base_misfit=judged.before,
         extended_misfit=judged.after,
         is_held_out=bool(spans.judging),
-        horizon=_horizon(left),
+        horizon=horizon_of(left),
         effects=effects,
         slots=judged.slots,
         location=locate(longest, errors, floor, values["u0"]),
@@ -265,53 +232,6 @@ def _is_no_better(second: Diagnosis, first: Explained) -> bool:
     return second.bic > first.best.bic - NAMING_MARGIN
 
 
-def _judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callable[[str], None]) -> Judged:
-    """Scores on held-out spans; what each effect is worth, and the slots."""
-    best, search, left, waves, _ = explained
-    model = best if waves is None else waves.model
-    on_progress("held-out check")
-    fit = best.fit
-    known = dict(zip(fit.structure.names, fit.parameters.tolist(), strict=True))
-    spans = clear_of(spans, [known[name] for name in fit.structure.moments])
-    horizon = _horizon(left)
-    # The very waves that were met are chance, and the regular one in their place may come out of step.
-    foretelling = best if waves is None else waves.fitted
-    before, after = (misfit(one, spans, floor, horizon) for one in (search.base, foretelling))
-    late = unresolved_in(best, search.fitter.recordings)
-    unnamed = minute_in(best) | late | (frozenset() if waves is None else waves.theirs)
-    effects = [one for one in _named(search, best, spans, floor, after, horizon) if one.name not in unnamed]
-    if waves is not None and WAVES not in best.names:
-        effects.append(NamedEffect(name=WAVES, delta_bic=waves.delta_bic))
-    effects.sort(key=lambda effect: -effect.delta_bic)
-    is_astray = best.fit.has_process_noise and waves is None and horizon is None and after.chi2 > before.chi2
-    is_told = not is_astray or foretells(search.base, best, spans, floor, HORIZON)
-    lean = without_unknown(search, best)
-    bare = after if lean is best else misfit(lean, spans, floor, horizon)
-    is_trace = waves is None and is_slight(lean, before, bare)
-    verdict = verdict_on(model, left, before, after, evidence(waves), is_told, is_trace, late)
-    return Judged(before, after, effects, verdict, _slots(search, best, effects, verdict))
-
-
-def _horizon(left: Leftover) -> float | None:
-    """s, how far ahead is foretold where forces too weak for a sea lead any free run away; else None."""
-    return HORIZON if left.is_of_what_drives or left.is_no_sea else None
-
-
-def _named(
-    search: Search, best: Explanation, spans: Spans, floor: Array, after: Misfit, horizon: float | None
-) -> list[NamedEffect]:
-    names = known_in(best)
-    return [
-        NamedEffect(
-            name=name,
-            delta_bic=min(without.bic - best.bic, MOST_WORTH),
-            heldout_gain=1.0 - after.chi2 / misfit(without, spans, floor, horizon).chi2,
-            twins=twins(search, best, name),
-        )
-        for name, without in zip(names, search.each_without(best, names), strict=True)
-    ]
-
-
 def _with_coefficients(effect: NamedEffect, values: dict[str, float], std: dict[str, float]) -> NamedEffect:
     return NamedEffect(
         name=effect.name,
@@ -330,24 +250,6 @@ def _refitted(explanation: Explanation, recordings: list[Recording]) -> Explanat
     if explanation.fit.has_process_noise:
         return again_under_forces(fitter, explanation)
     return fitter.across(fitter.refitted(explanation))
-
-
-def _slots(
-    search: Search, best: Explanation, effects: list[NamedEffect], verdict: Verdict
-) -> dict[Slot, float]:
-    """Shares that add up to 1: of the evidence of what was found, else of what each slot could gain."""
-    shares: dict[Slot, float] = dict.fromkeys(SLOTS, 0.0)
-    found = {name: search.without(best, name).bic - best.bic for name in best.names & UNKNOWN.keys()}
-    found |= {effect.name: effect.delta_bic for effect in effects}
-    if found:
-        for name, worth in found.items():
-            shares[named(name).slot] += float(np.clip(worth, 0.0, MOST_WORTH))
-    elif verdict != "no_mismatch":
-        for name, gain in search.gains(best).items():
-            slot = named(name).slot
-            shares[slot] = max(shares[slot], gain if np.isfinite(gain) else 0.0)
-    total = sum(shares.values())
-    return {slot: share / total for slot, share in shares.items()} if total > 0.0 else shares
 
 
 def _ranking(search: Search) -> Ranking:

@@ -10,8 +10,9 @@ from hidden_dive import Extra, hidden_dive, nothing
 
 from host.catalogue import structure_of
 from host.diagnosis import plane_choice
-from host.diagnosis.diagnose import Judged, _apart, _on_all
+from host.diagnosis.diagnose import _apart, _on_all
 from host.diagnosis.fits.patience import patience
+from host.diagnosis.judge import Judged
 from host.diagnosis.plane_choice import Way, likelier_first
 from host.diagnosis.proof.scoring import Misfit
 from host.diagnosis.proof.verdict import Verdict

@@ -12,8 +12,9 @@ from host.catalogue.moments import SCANS
 from host.diagnosis.against.comparison import Comparison, EffectDifference, compare
 from host.diagnosis.against.other_side import side_of
 from host.diagnosis.answer import Against, Answer
-from host.diagnosis.diagnose import Diagnosis, NamedEffect
+from host.diagnosis.diagnose import Diagnosis
 from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.judge import NamedEffect
 from host.diagnosis.separation import separations
 from host.diagnosis.told.pictures import layers_picture
 from host.diagnosis.told.report import _dated, write_report

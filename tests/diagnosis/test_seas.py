@@ -7,7 +7,7 @@ import pytest
 from hidden_dive import BASE, Extra, hidden_dive
 
 from host.catalogue import ORDINARY, structure_of
-from host.diagnosis.diagnose import _judge, _unnamed, diagnose
+from host.diagnosis.diagnose import _unnamed, diagnose
 from host.diagnosis.disturbances import plain_waves as plain_waves_module
 from host.diagnosis.disturbances.plain_waves import _beside_hull, _follow_the_plane, _linear_in, plain_waves
 from host.diagnosis.disturbances.seas import (
@@ -29,6 +29,7 @@ from host.diagnosis.fits.leftover import leftover
 from host.diagnosis.fits.sea_fits import with_sea, with_waves
 from host.diagnosis.fits.trims import retrimmed
 from host.diagnosis.fits.workers import Workers
+from host.diagnosis.judge import judge
 from host.diagnosis.recordings.spans import divide
 from host.diagnosis.search.search import Search
 from host.likelihood.waves import mean_moment
@@ -267,7 +268,7 @@ def test_an_offset_that_is_the_waves_own_stays_in_the_model_without_a_name() -> 
             (best.names, {"surface_waves"}),
         ):
             told = Waves(delta_bic=100.0, fitted=best, model=best, theirs=theirs)
-            judged = _judge(
+            judged = judge(
                 Explained(best, search, leftover(fitter, best), told), spans, fitter.floor, lambda _: None
             )
             assert {effect.name for effect in judged.effects} == named

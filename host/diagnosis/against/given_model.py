@@ -8,10 +8,11 @@ from host.catalogue import BY_NAME, named
 from host.diagnosis.against.comparison import Comparison, EffectDifference, compare
 from host.diagnosis.against.other_side import Side
 from host.diagnosis.answer import Against, Answer
-from host.diagnosis.diagnose import SLOTS, Diagnosis, NamedEffect
+from host.diagnosis.diagnose import Diagnosis
 from host.diagnosis.fits.explanation import Explanation
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.sea_fits import levels
+from host.diagnosis.judge import SLOTS, NamedEffect
 from host.diagnosis.proof.locate import locate
 from host.diagnosis.proof.scoring import Misfit, free_run_errors, misfit
 from host.diagnosis.proof.unknown_force import UnknownForce, unknown_force

@@ -10,8 +10,9 @@ from host.catalogue import BY_NAME, structure_of
 from host.catalogue.moments import SCANS
 from host.diagnosis.against.comparison import Status, figure
 from host.diagnosis.answer import Against, Answer
-from host.diagnosis.diagnose import Diagnosis, NamedEffect
+from host.diagnosis.diagnose import Diagnosis
 from host.diagnosis.fits.setting import SURGE
+from host.diagnosis.judge import NamedEffect
 from host.diagnosis.proof.deviations import interval
 from host.diagnosis.proof.scoring import Misfit
 from host.diagnosis.search.unknown_physics import unknown_in
