@@ -9,7 +9,7 @@ import numpy as np
 from host.catalogue import BY_NAME
 from host.diagnosis.disturbances.seas import Explained, Waves, evidence
 from host.diagnosis.explain import explain
-from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
 from host.diagnosis.fits.margins import LARGEST_SET, NAMING_MARGIN
 from host.diagnosis.fits.patience import is_over, was_cut
@@ -189,7 +189,7 @@ def _diagnosed(
                     _apart(way),
                     told,
                     CUT_SHORT * was_cut(),
-                    *_unnamed(best, waves, recordings),
+                    *_unnamed(best, waves, recordings, judged.unproven),
                     *(_other_answers(found) or hardly),
                 ],
             )
@@ -258,7 +258,9 @@ def _ranking(search: Search) -> Ranking:
     return sorted((pair for pair in alone if pair[1] > -inf), key=lambda pair: -pair[1])
 
 
-def _unnamed(best: Explanation, waves: Waves | None, recordings: list[Recording]) -> list[str]:
+def _unnamed(
+    best: Explanation, waves: Waves | None, recordings: list[Recording], unproven: Names = frozenset()
+) -> list[str]:
     """Of what is in the model and not named."""
     angle, theirs = np.rad2deg(LEAST_ANGLE), waves.theirs if waves else frozenset()
     reasons = {
@@ -267,6 +269,7 @@ def _unnamed(best: Explanation, waves: Waves | None, recordings: list[Recording]
         "too short to be told from how the plane moved between rows: it is not named": unresolved_in(
             best, recordings
         ),
+        "without which stretches that it never saw are foretold better: not named": unproven,
     }
     return [
         f"The model holds {' and '.join(_with_article(name) for name in sorted(names))} {reason}."

@@ -8,12 +8,13 @@ import numpy as np
 
 from host.catalogue import UNKNOWN, named
 from host.diagnosis.disturbances.seas import Explained, evidence
-from host.diagnosis.fits.explanation import Explanation
+from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.leftover import Leftover
 from host.diagnosis.fits.sea_fits import WAVES
 from host.diagnosis.proof.minute import minute_in, unresolved_in
 from host.diagnosis.proof.scoring import Misfit, foretells, misfit
 from host.diagnosis.proof.slight import is_slight
+from host.diagnosis.proof.unproven import unproven_in
 from host.diagnosis.proof.verdict import Verdict, verdict_on
 from host.diagnosis.recordings.spans import Spans, clear_of
 from host.diagnosis.search.exchange import twins
@@ -44,11 +45,15 @@ class NamedEffect:
 
 
 class Judged(NamedTuple):
-    """What the held-out spans say of the base and of the model, what is named, where, and the verdict."""
+    """What the held-out spans say of the base and of the model, what is named, where, and the verdict.
+
+    unproven  what is not named as these spans speak against it
+    """
 
     before: Misfit
     after: Misfit
     effects: list[NamedEffect]
+    unproven: Names
     verdict: Verdict
     slots: dict[Slot, float]
 
@@ -77,7 +82,13 @@ def judge(explained: Explained, spans: Spans, floor: Array, on_progress: Callabl
     bare = after if lean is best else misfit(lean, spans, floor, horizon)
     is_trace = waves is None and is_slight(lean, before, bare)
     verdict = verdict_on(model, left, before, after, evidence(waves), is_told, is_trace, late)
-    return Judged(before, after, effects, verdict, _slots(search, best, effects, verdict))
+    unproven = frozenset[str]()
+    is_judged = spans.judging and (horizon is not None or not best.fit.has_process_noise)
+    if is_judged and not left.is_nothing and verdict != "explained":
+        unproven = unproven_in({effect.name: effect.heldout_gain for effect in effects})
+        effects = [effect for effect in effects if effect.name not in unproven]
+        verdict = verdict if effects else "unexplained"
+    return Judged(before, after, effects, unproven, verdict, _slots(search, best, effects, verdict))
 
 
 def horizon_of(left: Leftover) -> float | None:

@@ -221,7 +221,7 @@ def test_what_is_apart_is_left_out_and_told(monkeypatch: pytest.MonkeyPatch) -> 
     misfit = Misfit(depth_rmse_m=1.0, pitch_rmse_rad=1.0, chi2_depth=1.0, chi2_pitch=1.0)
 
     def judged(verdict: Verdict) -> Judged:
-        return Judged(misfit, misfit, [], verdict, {})
+        return Judged(misfit, misfit, [], frozenset(), verdict, {})
 
     assert _on_all(judged("explained"), way) == "partly_explained"
     assert _on_all(judged("no_mismatch"), way) == "partly_explained"
