@@ -25,6 +25,7 @@ from host.diagnosis.search.outset import (
     at_the_outset,
     beside_what_leads,
     leads_on,
+    one_says_most,
     one_that_says_all,
     pushed_by_forces,
     says_all,
@@ -89,10 +90,11 @@ def likelier_first(
     """The ways, the likelier first, as what tells more than the base equations do sees them.
 
     That is all that every vehicle has, where nothing is left beside it; else plain waves, where there are
-    any, with all that where it is likelier; else all that every vehicle has, where random forces account for
-    what is left, or next to nothing is; else single effects. Where these forces explain far more without
-    accounting for it all, they tell which way. A plane that moved more often than its rows show leaves one.
-    A filter that leads the hull where no free run does is asked before what may lead, and again beside it.
+    any, with all that where it is likelier; else single effects, where one says most; else all that every
+    vehicle has, where random forces account for what is left, or next to nothing is; else single effects.
+    Where these forces explain far more without accounting for it all, they tell which way. A plane that moved
+    more often than its rows show leaves one. A filter that leads the hull where no free run does is asked
+    before what may lead, and again beside it.
 
     may_leave_out  whether stretches may be left out without which nothing is left beside it
     """
@@ -103,6 +105,8 @@ def likelier_first(
         return _begun_with([leading, *others], whole)
     one = None if whole is None else one_that_says_all(leading.fitter, whole, jobs)
     seen, asked = _among_waves(found), None
+    if whole is not None and one is None and not seen and one_says_most(leading.fitter, whole):
+        return by_single_effects(found, on_progress, jobs)
     if whole is not None and one is None and not is_over():
         asked = whole
         if not seen and (led := _led_by_a_filter([leading, *others], whole, whole, on_progress, jobs)):

@@ -197,7 +197,7 @@ def test_a_turn_at_the_end_is_apart_if_there_was_one_before() -> None:
 
 def test_what_is_apart_is_left_out_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
     dive = hidden_dive(duration=250.0)
-    fitter: Any = SimpleNamespace(root=SimpleNamespace(bic=0.0), excess=lambda _: 9.0)
+    fitter: Any = SimpleNamespace(root=SimpleNamespace(bic=0.0), excess=lambda _: 9.0, at_first={})
     whole: Any = SimpleNamespace(bic=0.0, fit=None, names=structure_of(()).effect_names, leaves_white=False)
     rest: list[Any] = []
 

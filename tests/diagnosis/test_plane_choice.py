@@ -19,7 +19,7 @@ MANY = frozenset({*ORDINARY})
 def test_it_tells_which_way_the_plane_went(monkeypatch: pytest.MonkeyPatch) -> None:
     def way(root: float, there: float) -> Way:
         known = SimpleNamespace(bic=root, fit=2.0 * MUCH)
-        fitter = SimpleNamespace(root=known, base=known, excess=lambda fit: fit)
+        fitter = SimpleNamespace(root=known, base=known, excess=lambda fit: fit, at_first={})
         fitter.there, fitter.polished = SimpleNamespace(bic=there, fit=0.1), lambda one: one
         return Way([], cast("Any", fitter))
 
@@ -119,6 +119,24 @@ def test_several_speeds_are_asked_for_where_no_single_change_is_all_and_more_is_
     monkeypatch.setattr(plane_choice, "_in_short_runs", lambda _, whole, *__: (short, whole))
     monkeypatch.setattr(plane_choice, "_among_waves", lambda _: [])
     monkeypatch.setattr(plane_choice, "_led", lambda *_: [])
-    fitter: Any = SimpleNamespace(root=SimpleNamespace(bic=0.0), excess=lambda fit: fit)
+    fitter: Any = SimpleNamespace(root=SimpleNamespace(bic=0.0), excess=lambda fit: fit, at_first={})
     found = likelier_first([Way([], fitter)], lambda _: None, 1, may_leave_out=True)
     assert [way.outset for way in found] == [told if left > LOST else None]
+
+
+def test_where_one_effect_says_most_the_search_begins_with_single_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    whole: Any = SimpleNamespace(bic=0.0, fit=2.0 * LOST, names=MANY, leaves_white=False)
+    ballast: Any = SimpleNamespace(bic=-9.0, fit=1.3, names={"ballast_change"}, leaves_white=False)
+    monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: whole)
+    monkeypatch.setattr(plane_choice, "one_that_says_all", lambda *_: None)
+    monkeypatch.setattr(plane_choice, "_among_waves", lambda _: [])
+    monkeypatch.setattr(plane_choice, "_led", lambda *_: pytest.fail("a free run follows it"))
+    monkeypatch.setattr(plane_choice, "_in_short_runs", lambda *_: pytest.fail("it is no turn"))
+    fitter: Any = SimpleNamespace(
+        root=SimpleNamespace(bic=0.0), excess=lambda fit: fit, at_first={"alone": ballast}
+    )
+    (way,) = likelier_first([Way([], fitter)], lambda _: None, 1, may_leave_out=True)
+    assert way.outset is None
+    assert way.pushed is None

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -159,6 +159,24 @@ def test_one_effect_that_leaves_nothing_is_found_before_stretches_are_left_out(
     monkeypatch.setattr(outset, "_by_fewer", lambda *a: a[2])
     outset._beside_what_leads(real, real.root, (*DRIVE, *LEADING_FORMS, *IN_TIME), 1)
     assert asked == [*SCANS, *DRIVE, *LEADING_FORMS, *IN_TIME]  # each fitted once
+
+
+@pytest.mark.parametrize(
+    ("name", "bic", "left", "whole", "says_most"),
+    [
+        ("ballast_change", -9.0, 1.3, 40.0, True),
+        ("ballast_change", -9.0, 2.5, 40.0, False),
+        ("ballast_change", 9.0, 1.3, 40.0, False),
+        ("ballast_change", -9.0, 1.3, 1.5, False),  # so does all that every vehicle has
+        ("unknown_wandering_force", -9.0, 1.3, 40.0, False),  # as it follows turns
+    ],
+)
+def test_one_effect_of_the_catalogue_may_say_most(
+    name: str, bic: float, left: float, whole: float, says_most: bool
+) -> None:
+    alone: Any = SimpleNamespace(bic=bic, fit=left, names=frozenset({FREE_TRIM.name, name}))
+    fitter: Any = SimpleNamespace(excess=lambda fit: fit, at_first={alone.names: alone})
+    assert outset.one_says_most(fitter, cast("Any", SimpleNamespace(bic=0.0, fit=whole))) is says_most
 
 
 @pytest.mark.parametrize(("left", "asked"), [(LITTLE - 0.1, []), (LITTLE + 0.1, [*DRIVE, *LEADING_FORMS])])

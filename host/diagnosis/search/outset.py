@@ -107,6 +107,16 @@ def one_that_says_all(fitter: Fitter, whole: Explanation, jobs: int) -> Explanat
     return best if is_told and says_all(fitter, best) and best.bic < whole.bic else None
 
 
+def one_says_most(fitter: Fitter, whole: Explanation) -> bool:
+    """Whether one of the catalogue, asked alone, leaves little where all that every vehicle has does not.
+
+    Then few effects act on a textbook's hull, whose free run can be followed.
+    """
+    alone = (one for one in fitter.at_first.values() if one.names.isdisjoint(UNKNOWN))
+    best = min(alone, key=lambda e: e.bic, default=whole)
+    return best.bic < whole.bic and fitter.excess(best.fit) < MUCH < fitter.excess(whole.fit)
+
+
 def _what_may_lead(fitter: Fitter, whole: Explanation) -> tuple[str, ...]:
     is_lost = fitter.excess(whole.fit) > LOST
     likely = (*DRIVE, *LEADING_FORMS, *IN_TIME)
