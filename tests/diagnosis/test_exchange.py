@@ -1,11 +1,14 @@
 """What may stand in the place of a member is found, also where no prediction ranks it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hidden_dive import hidden_dive
 
 from host.catalogue.nuisance import FREE_TRIM
 from host.diagnosis.fits.fitter import Fitter
+from host.diagnosis.fits.margins import ROUGH
 from host.diagnosis.fits.trims import retrimmed
 from host.diagnosis.fits.workers import Workers
 from host.diagnosis.search.exchange import _likely, exchanged, twins
@@ -98,3 +101,19 @@ def test_what_was_exchanged_before_is_not_exchanged_again() -> None:
         exchanged(search, best, settled=frozenset({"net_buoyancy"}))
         assert len(search.tried) > 2
         assert all("net_buoyancy" in tried for tried in search.tried if len(tried) == len(names))
+
+
+@pytest.mark.parametrize("was_best", [True, False])
+def test_only_what_came_near_on_a_part_is_tried_on_all(was_best: bool, fitter: Fitter) -> None:
+    best = fitter.polished(fitter.grown(fitter.base, "trim_moment", []))
+    with Workers(fitter, 1) as workers:
+        part = Search(fitter, workers, lambda _: None, fitter.base, fitter.root)
+        search = Search(fitter, workers, lambda _: None, fitter.base, fitter.root, part)
+        far, near = best.bic + ROUGH + 1.0, best.bic + ROUGH - 1.0
+        for name, bic in (("rudder_offset", near), ("net_buoyancy", far), ("munk_moment", near)):
+            part.remember(replace(fitter.grown(fitter.base, name, []), bic=bic))
+        part.remember(replace(best, bic=best.bic if was_best else far))
+        exchanged(search, search.remember(best))
+    asked = {name for names in search.rivals for name in names}
+    assert "rudder_offset" in asked
+    assert ("net_buoyancy" in asked) is not was_best

@@ -7,7 +7,7 @@ from host.catalogue import BY_NAME, ORDINARY, named
 from host.catalogue.kin import AS_A_LEVER, OFFSETS, PITCHING_INTO_DEPTH, both_come, measure_alike
 from host.diagnosis.fits.explanation import Explanation, Names
 from host.diagnosis.fits.fitter import Fitter
-from host.diagnosis.fits.margins import FEW, LARGEST_SET, NAMING_MARGIN, SMALL, TWIN_MARGIN, margin
+from host.diagnosis.fits.margins import FEW, LARGEST_SET, NAMING_MARGIN, ROUGH, SMALL, TWIN_MARGIN, margin
 from host.diagnosis.fits.trims import retrimmed
 from host.diagnosis.fits.workers import Task
 from host.diagnosis.search.candidates import eligible
@@ -36,7 +36,8 @@ def exchanged(search: "Search", best: Explanation, settled: Names = frozenset())
         kin = {e.name for e in eligible(search) if _is_kin(search, e.name, member)}
         # In a large set a rare member may stand for a common one that joined too late.
         fair = kin if named(member).is_common else kin | {*ORDINARY}
-        gains = search.gains(smaller, is_small, fair if is_large else None)
+        near = _near_on_a_part(search, best, smaller)
+        gains = search.gains(smaller, is_small, fair if is_large else near)
         rivals = _likely(gains, smaller.bic - best.bic, RIVALS if is_small else FEW)
         kin &= gains.keys()
         rivals |= kin if is_small else {name for name in kin if _is_close_kin(name, member)}
@@ -46,7 +47,7 @@ def exchanged(search: "Search", best: Explanation, settled: Names = frozenset())
             tasks.setdefault(smaller.names | {name}, fits)
         if member in OFFSETS:
             kept = smaller.names & {*OFFSETS}
-            for name in {*OFFSETS} - best.names:
+            for name in {*OFFSETS} - best.names if near is None else near & {*OFFSETS}:
                 tasks[smaller.names | {name}] = (retrimmed, (best, kept | {name}))
     tasks = {names: task for names, task in tasks.items() if names not in search.rivals}
     search.rivals.update(tasks)
@@ -65,6 +66,22 @@ def exchanged(search: "Search", best: Explanation, settled: Names = frozenset())
     if rival.bic > best.bic - 0.01:
         return best
     return rival if is_small else pruned(search, rival)
+
+
+def _near_on_a_part(search: "Search", best: Explanation, smaller: Explanation) -> set[str] | None:
+    """The effects that came near in the place of a member where a part of the recordings was searched.
+
+    What is far behind there is farther on all. None where the part had another best set, or forces act, under
+    which all come nearer.
+    """
+    part = search.part
+    if part is None or best.fit.has_process_noise or len(best.names) > LARGEST_SET:
+        return None
+    there = min(part.untrimmed, key=lambda e: e.bic)
+    if there.names != best.names or there.fit.has_process_noise:
+        return None
+    alike = (e for e in part.untrimmed if len(e.names - smaller.names) == 1 and e.names > smaller.names)
+    return {next(iter(e.names - smaller.names)) for e in alike if e.bic < there.bic + ROUGH} - best.names
 
 
 def _moves_depth(rival: Explanation, best: Explanation) -> bool:
