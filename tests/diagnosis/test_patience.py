@@ -1,5 +1,6 @@
 """A search that is to end early, and what it then says."""
 
+from contextlib import suppress
 from math import inf
 from types import SimpleNamespace
 from typing import Any
@@ -10,6 +11,7 @@ from hidden_dive import hidden_dive
 
 from host.diagnosis.diagnose import CUT_SHORT, _on_all, diagnose
 from host.diagnosis.fits.patience import is_over, patience, was_cut
+from host.diagnosis.search.outset import goes_on_from
 from tools.commands.diagnose import _seconds
 
 
@@ -53,6 +55,23 @@ def test_a_search_without_time_answers_with_what_one_effect_tells_and_says_so() 
     assert found.verdict == "explained"  # one effect leaves nothing
     assert CUT_SHORT in found.remaining
     assert [effect.name for effect in found.effects] == ["heave_pitch_rate_coupling"]
+
+
+@pytest.mark.parametrize("limit", [0.0, 3600.0])
+def test_nothing_more_joins_once_the_time_is_over(limit: float) -> None:
+    best: Any = SimpleNamespace(fit=None, names=frozenset({"munk_moment"}))
+    asked: list[str] = []
+    search: Any = SimpleNamespace(
+        fitter=SimpleNamespace(excess=lambda _: 9.0),
+        on_progress=lambda _: None,
+        joint=set(),
+        remember=lambda one: one,
+        gains=lambda _: asked.append("gains"),
+        workers=SimpleNamespace(results=list),
+    )
+    with patience(limit), suppress(AttributeError):  # it goes on, and the stub has no more
+        assert goes_on_from(search, best)
+    assert asked == ([] if limit == 0.0 else ["gains"])
 
 
 @pytest.mark.parametrize(
