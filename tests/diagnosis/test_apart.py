@@ -56,7 +56,7 @@ def spans_of(recordings: list[Recording]) -> list[Span]:
     [
         pytest.param(turning, True, marks=pytest.mark.long),
         pytest.param(lightened, False, marks=pytest.mark.long),
-        (everywhere, False),
+        pytest.param(everywhere, False, marks=pytest.mark.long),
         (nothing, False),
     ],
 )
@@ -104,6 +104,7 @@ def test_what_most_pieces_tell_is_found_though_the_others_bend_all() -> None:
     assert left_out == {77, 179, 281}
 
 
+@pytest.mark.long
 def test_little_that_is_left_is_no_turn_and_what_runs_away_explains_no_piece(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

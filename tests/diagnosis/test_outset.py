@@ -148,6 +148,7 @@ def test_a_textbook_vehicle_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> Non
     assert at_the_outset(fitter) is None
 
 
+@pytest.mark.long
 def test_where_it_leads_nowhere_something_may_have_changed(monkeypatch: pytest.MonkeyPatch) -> None:
     fitter = Fitter([hidden_dive(ballast, duration=60.0)])
     assert fitter.excess(fitter.root.fit) > LOST

@@ -60,6 +60,7 @@ def test_a_plane_that_is_told_when_it_is_read_holds_until_then() -> None:
     assert with_plane_moments(told) is told
 
 
+@pytest.mark.long
 def test_where_each_row_may_have_a_reading_moments_must_differ(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = read_every(hidden_dive(), 5)
     assert seen.plane is not None
@@ -130,6 +131,7 @@ def test_drag_is_named_from_messages_that_come_seldom(tmp_path: Path) -> None:
     assert [effect["name"] for effect in found["effects"]] == ["heave_quadratic_drag"]
 
 
+@pytest.mark.long
 def test_of_long_recordings_all_is_moved_though_an_excerpt_begins(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plane_moments, "excerpt", lambda runs: [runs[0].between(0.0, 30.0)])
     (moved,) = with_plane_moments([read_every(hidden_dive(), 5)])

@@ -151,6 +151,7 @@ def test_what_seldom_acts_alone_is_charged_for_it() -> None:
     assert more == pytest.approx(np.log(fit.samples) + RARITY)
 
 
+@pytest.mark.long
 def test_what_runs_away_joins_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     def grown(_: Fitter, parent: Explanation, name: str, *__: object) -> Explanation:
         return Explanation(parent.names | {name}, parent.fit, np.inf if name in lost else parent.bic)
@@ -378,6 +379,7 @@ def test_what_wanders_ends_no_search_before_a_dozen_were_tried(
     assert foreign.names in search.tried
 
 
+@pytest.mark.long
 def test_of_two_that_come_late_the_one_does_not_hide_the_other() -> None:
     names = frozenset({"actuator_delay", "pitch_sensor_lag"})
     fitter = Fitter([flown({"delay": 0.9, "pitch_lag_time": 0.33}, names)])

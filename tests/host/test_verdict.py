@@ -90,6 +90,7 @@ def test_an_actuator_without_a_scale_is_no_angle(dive):
     assert overview_plot(raw) != overview_plot(dive)
 
 
+@pytest.mark.long
 def test_many_short_stretches_are_held_out_too(dive):
     edges = np.arange(0.0, 61.0, 4.0)
     pieces = [dive.between(a, b) for a, b in pairwise(edges)]
