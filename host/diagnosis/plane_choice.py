@@ -93,8 +93,8 @@ def likelier_first(
     any, with all that where it is likelier; else single effects, where one says most; else all that every
     vehicle has, where random forces account for what is left, or next to nothing is; else single effects.
     Where these forces explain far more without accounting for it all, they tell which way. A plane that moved
-    more often than its rows show leaves one. A filter that leads the hull where no free run does is asked
-    before what may lead, and again beside it.
+    more often than its rows show leaves one. Where what may lead leaves something, a filter that
+    leads the hull where no free run does is asked, without that and beside it.
 
     may_leave_out  whether stretches may be left out without which nothing is left beside it
     """
@@ -105,18 +105,20 @@ def likelier_first(
         return _begun_with([leading, *others], whole)
     one = None if whole is None else one_that_says_all(leading.fitter, whole, jobs)
     seen, asked = _among_waves(found), None
-    if whole is not None and one is None and not seen and one_says_most(leading.fitter, whole):
+    if whole is not None and one is None and not seen and one_says_most(leading.fitter, whole, jobs):
         return by_single_effects(found, on_progress, jobs)
-    if whole is not None and one is None and not is_over():
+    beside = None if whole is None or one or is_over() else beside_what_leads(leading.fitter, whole, jobs)
+    if whole is not None and beside is not None and not says_all(leading.fitter, beside) and not is_over():
         asked = whole
         if not seen and (led := _led_by_a_filter([leading, *others], whole, whole, on_progress, jobs)):
             return led
         told, whole = _at_speeds_or_in_short_runs([leading, *others], whole, on_progress, jobs, may_leave_out)
         if told:
             return told
+        if whole is not asked:
+            beside = None if is_over() else beside_what_leads(leading.fitter, whole, jobs)
     plain = whole
-    if whole is not None:
-        whole = one or (whole if is_over() else beside_what_leads(leading.fitter, whole, jobs))
+    whole = one or beside or whole
     if seen:
         on_progress("what every vehicle has, in the waves")
         return _in_a_swell(seen, whole)

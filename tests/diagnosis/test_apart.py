@@ -208,6 +208,8 @@ def test_what_is_apart_is_left_out_and_told(monkeypatch: pytest.MonkeyPatch) -> 
 
     monkeypatch.setattr(plane_choice, "ways", begun)
     monkeypatch.setattr(plane_choice, "one_that_says_all", lambda *_: None)
+    monkeypatch.setattr(plane_choice, "one_says_most", lambda *_: False)
+    monkeypatch.setattr(plane_choice, "beside_what_leads", lambda _, one, __: one)
     monkeypatch.setattr(plane_choice, "short_runs", lambda *_: rest)
     monkeypatch.setattr(plane_choice, "stretches_apart", lambda *_: apart.Apart([(BEGINS, ENDS)]))
     monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: None if rest else whole)

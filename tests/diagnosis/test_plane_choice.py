@@ -11,6 +11,7 @@ from host.diagnosis import plane_choice
 from host.diagnosis.fits import sea_fits
 from host.diagnosis.fits.margins import MUCH
 from host.diagnosis.plane_choice import Way, likelier_first
+from host.diagnosis.search import outset
 from host.diagnosis.search.outset import LOST
 
 MANY = frozenset({*ORDINARY})
@@ -115,6 +116,8 @@ def test_several_speeds_are_asked_for_where_no_single_change_is_all_and_more_is_
     short = [Way([], cast("Any", None))]
     monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: whole)
     monkeypatch.setattr(plane_choice, "one_that_says_all", lambda *_: None)
+    monkeypatch.setattr(plane_choice, "one_says_most", lambda *_: False)
+    monkeypatch.setattr(plane_choice, "beside_what_leads", lambda _, one, __: one)
     monkeypatch.setattr(plane_choice, "at_several_speeds", lambda *_: told)
     monkeypatch.setattr(plane_choice, "_in_short_runs", lambda _, whole, *__: (short, whole))
     monkeypatch.setattr(plane_choice, "_among_waves", lambda _: [])
@@ -131,6 +134,7 @@ def test_where_one_effect_says_most_the_search_begins_with_single_ones(
     ballast: Any = SimpleNamespace(bic=-9.0, fit=1.3, names={"ballast_change"}, leaves_white=False)
     monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: whole)
     monkeypatch.setattr(plane_choice, "one_that_says_all", lambda *_: None)
+    monkeypatch.setattr(outset, "_each_alone", lambda *_: [])  # but what led already
     monkeypatch.setattr(plane_choice, "_among_waves", lambda _: [])
     monkeypatch.setattr(plane_choice, "_led", lambda *_: pytest.fail("a free run follows it"))
     monkeypatch.setattr(plane_choice, "_in_short_runs", lambda *_: pytest.fail("it is no turn"))
@@ -140,3 +144,30 @@ def test_where_one_effect_says_most_the_search_begins_with_single_ones(
     (way,) = likelier_first([Way([], fitter)], lambda _: None, 1, may_leave_out=True)
     assert way.outset is None
     assert way.pushed is None
+
+
+@pytest.mark.parametrize("left", [0.5 * MUCH, 2.0 * MUCH])
+def test_a_filter_is_asked_only_where_what_may_lead_leaves_something(
+    monkeypatch: pytest.MonkeyPatch, left: float
+) -> None:
+    asked: list[Any] = []
+    whole: Any = SimpleNamespace(bic=0.0, fit=2.0 * LOST, names=MANY, leaves_white=False)
+    beside: Any = SimpleNamespace(bic=-9.0, fit=left, names=MANY | {"actuator_delay"}, leaves_white=True)
+    monkeypatch.setattr(plane_choice, "at_the_outset", lambda _: whole)
+    monkeypatch.setattr(plane_choice, "one_that_says_all", lambda *_: None)
+    monkeypatch.setattr(plane_choice, "one_says_most", lambda *_: False)
+    monkeypatch.setattr(plane_choice, "beside_what_leads", lambda *_: beside)
+    monkeypatch.setattr(plane_choice, "at_several_speeds", lambda _, one: one)
+    monkeypatch.setattr(plane_choice, "_in_short_runs", lambda _, one, *__: (asked.append(one) or [], one))
+    monkeypatch.setattr(plane_choice, "_among_waves", lambda _: [])
+    monkeypatch.setattr(plane_choice, "_led_by_a_filter", lambda *_: [])
+    monkeypatch.setattr(plane_choice, "_astray", lambda *_: [])
+    monkeypatch.setattr(plane_choice, "_pushed_about", lambda *_: [])
+    monkeypatch.setattr(plane_choice, "stretches_apart", lambda *_, **__: SimpleNamespace(spans=[]))
+    monkeypatch.setattr(plane_choice, "short_runs", lambda *_: None)
+    fitter: Any = SimpleNamespace(
+        root=SimpleNamespace(bic=0.0, fit=2 * LOST), excess=lambda fit: fit, at_first={}, polished=lambda e: e
+    )
+    (way,) = likelier_first([Way([], fitter)], lambda _: None, 1, may_leave_out=True)
+    assert way.outset is beside
+    assert asked == ([] if left < MUCH else [whole])

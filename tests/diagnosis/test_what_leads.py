@@ -172,11 +172,30 @@ def test_one_effect_that_leaves_nothing_is_found_before_stretches_are_left_out(
     ],
 )
 def test_one_effect_of_the_catalogue_may_say_most(
-    name: str, bic: float, left: float, whole: float, says_most: bool
+    monkeypatch: pytest.MonkeyPatch, name: str, bic: float, left: float, whole: float, says_most: bool
 ) -> None:
     alone: Any = SimpleNamespace(bic=bic, fit=left, names=frozenset({FREE_TRIM.name, name}))
     fitter: Any = SimpleNamespace(excess=lambda fit: fit, at_first={alone.names: alone})
-    assert outset.one_says_most(fitter, cast("Any", SimpleNamespace(bic=0.0, fit=whole))) is says_most
+    monkeypatch.setattr(outset, "_each_alone", lambda *_: [])
+    assert outset.one_says_most(fitter, cast("Any", SimpleNamespace(bic=0.0, fit=whole)), 1) is says_most
+
+
+def test_what_is_of_no_hull_is_asked_alone_only_where_a_hull_leaves_much(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    buoyancy: Any = SimpleNamespace(bic=-9.0, fit=1.1, names=frozenset({"depth_dependent_buoyancy"}))
+    fitter: Any = SimpleNamespace(excess=lambda fit: fit, at_first={})
+    asked: list[str] = []
+
+    def each_alone(fitter: Any, names: tuple[str, ...], _: int) -> None:
+        asked.extend(names)
+        fitter.at_first[buoyancy.names] = buoyancy
+
+    monkeypatch.setattr(outset, "_each_alone", each_alone)
+    assert not outset.one_says_most(fitter, cast("Any", SimpleNamespace(bic=0.0, fit=MUCH - 0.1)), 1)
+    assert not asked
+    assert outset.one_says_most(fitter, cast("Any", SimpleNamespace(bic=0.0, fit=MUCH + 0.1)), 1)
+    assert asked == [*outset.NO_HULL]
 
 
 @pytest.mark.parametrize(("left", "asked"), [(LITTLE - 0.1, []), (LITTLE + 0.1, [*DRIVE, *LEADING_FORMS])])

@@ -52,6 +52,8 @@ TRADED, TINY = 2.0, 1e-6  # times a damping: it is a pole of something else
 LEADING = 3  # of what may lead, beside which all the rest is tried
 IN_TIME = ("surface_waves", "internal_wave", "unknown_swinging_moment", *sorted(WANDERING))
 """What swings with one period, or wanders. Of a sea it follows a part: little must be left beside it."""
+NO_HULL = ("depth_dependent_buoyancy", "depth_sensor_lag", "depth_sensor_lever_arm", "pitch_sensor_lag")
+"""Of the water or of a sensor, for which no hull does."""
 
 
 def at_the_outset(fitter: Fitter) -> Explanation | None:
@@ -107,14 +109,17 @@ def one_that_says_all(fitter: Fitter, whole: Explanation, jobs: int) -> Explanat
     return best if is_told and says_all(fitter, best) and best.bic < whole.bic else None
 
 
-def one_says_most(fitter: Fitter, whole: Explanation) -> bool:
+def one_says_most(fitter: Fitter, whole: Explanation, jobs: int) -> bool:
     """Whether one of the catalogue, asked alone, leaves little where all that every vehicle has does not.
 
     Then few effects act on a textbook's hull, whose free run can be followed.
     """
+    if fitter.excess(whole.fit) < MUCH:
+        return False
+    _each_alone(fitter, NO_HULL, jobs)
     alone = (one for one in fitter.at_first.values() if one.names.isdisjoint(UNKNOWN))
     best = min(alone, key=lambda e: e.bic, default=whole)
-    return best.bic < whole.bic and fitter.excess(best.fit) < MUCH < fitter.excess(whole.fit)
+    return best.bic < whole.bic and fitter.excess(best.fit) < MUCH
 
 
 def _what_may_lead(fitter: Fitter, whole: Explanation) -> tuple[str, ...]:
