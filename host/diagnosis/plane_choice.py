@@ -93,8 +93,8 @@ def likelier_first(
     any, with all that where it is likelier; else single effects, where one says most; else all that every
     vehicle has, where random forces account for what is left, or next to nothing is; else single effects.
     Where these forces explain far more without accounting for it all, they tell which way. A plane that moved
-    more often than its rows show leaves one. Where what may lead leaves something, a filter that
-    leads the hull where no free run does is asked, without that and beside it.
+    more often than its rows show leaves one. Where what may lead leaves something, a filter that leads
+    the hull where no free run does is asked, without that and beside it.
 
     may_leave_out  whether stretches may be left out without which nothing is left beside it
     """

@@ -147,7 +147,7 @@ def test_where_one_effect_says_most_the_search_begins_with_single_ones(
 
 
 @pytest.mark.parametrize("left", [0.5 * MUCH, 2.0 * MUCH])
-def test_a_filter_is_asked_only_where_what_may_lead_leaves_something(
+def test_no_filter_is_asked_without_what_leads_where_that_leaves_nothing(
     monkeypatch: pytest.MonkeyPatch, left: float
 ) -> None:
     asked: list[Any] = []
@@ -160,7 +160,7 @@ def test_a_filter_is_asked_only_where_what_may_lead_leaves_something(
     monkeypatch.setattr(plane_choice, "at_several_speeds", lambda _, one: one)
     monkeypatch.setattr(plane_choice, "_in_short_runs", lambda _, one, *__: (asked.append(one) or [], one))
     monkeypatch.setattr(plane_choice, "_among_waves", lambda _: [])
-    monkeypatch.setattr(plane_choice, "_led_by_a_filter", lambda *_: [])
+    monkeypatch.setattr(plane_choice, "_led_by_a_filter", lambda _, hull, *__: asked.append(hull) or [])
     monkeypatch.setattr(plane_choice, "_astray", lambda *_: [])
     monkeypatch.setattr(plane_choice, "_pushed_about", lambda *_: [])
     monkeypatch.setattr(plane_choice, "stretches_apart", lambda *_, **__: SimpleNamespace(spans=[]))
@@ -170,4 +170,5 @@ def test_a_filter_is_asked_only_where_what_may_lead_leaves_something(
     )
     (way,) = likelier_first([Way([], fitter)], lambda _: None, 1, may_leave_out=True)
     assert way.outset is beside
-    assert asked == ([] if left < MUCH else [whole])
+    first = [] if left < MUCH else [whole, whole]  # the filter, then short runs
+    assert asked == [*first, beside]  # and the filter beside what leads, which declines what leaves nothing
